@@ -22,7 +22,7 @@ _ITERATIONS = 20
 
 
 def variances_per_seed(answers: xr.Dataset) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Return, for each level, the variance of every answer times the number of seeds; and the squared error of the grid.
+    """Return, for each level, the variance of every answer times the number of seeds; and the square of the grid error.
 
     Variances are those of means of logarithms. A level without seeds is left out.
     """

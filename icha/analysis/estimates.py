@@ -25,9 +25,7 @@ from icha.path.targets import ESTIMATED_AT_TARGETS, ESTIMATED_OF_LOOPS
 LOOP = "loop"
 
 
-def estimate_campaign(
-    tree: xr.DataTree, *, asperities: bool = True, attrs: Mapping[str, str] = {}
-) -> xr.DataTree:
+def estimate_campaign(tree: xr.DataTree, *, asperities: bool = True, attrs: Mapping[str, str] = {}) -> xr.DataTree:
     """Return a tree with the answers of each study that has boundary elements for several seeds.
 
     Parameters
@@ -64,8 +62,10 @@ def _answers(study: xr.Dataset, coarse: xr.Dataset | None, asperities: bool) -> 
         return
     levels = {"asperities": (study if asperities else None, DEFAULT_MODEL), "coarse": (coarse, REFERENCE_MODEL)}
     levels |= {"fine": (study, REFERENCE_MODEL)}
-    for (kind, target), quantity in itertools.product([*_stops(study), (LOOP, 0.0)], (*ESTIMATED_AT_TARGETS, *ESTIMATED_OF_LOOPS)):
-        if (kind == LOOP) != (quantity in ESTIMATED_OF_LOOPS) or kind in ESTIMATED_AT_TARGETS.get(quantity, ()) or quantity not in study:
+    every = (*ESTIMATED_AT_TARGETS, *ESTIMATED_OF_LOOPS)
+    for (kind, target), quantity in itertools.product([*_stops(study), (LOOP, 0.0)], every):
+        prescribed = kind in ESTIMATED_AT_TARGETS.get(quantity, ())
+        if (kind == LOOP) != (quantity in ESTIMATED_OF_LOOPS) or prescribed or quantity not in study:
             continue
         values = {level: _values(data, model, quantity, kind, target) for level, (data, model) in levels.items()}
         for surface, slope, material in itertools.product(*(range(study.sizes[dim]) for dim in _CONTACT)):

@@ -19,11 +19,11 @@ from icha.configuration.campaign import BESIDE_STUDIES, Campaign, Contact
 from icha.configuration.errors import MOST_PROBLEMS, problem_of
 from icha.configuration.studies import MEASURED, SCALARS, RmsHeight, Study, slope_of_height
 from icha.configuration.surfaces import SURFACE_KINDS, MaterialSection
-from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
+from icha.contact.models import DEFAULT_MODEL, MODELS, REFERENCE_MODEL
 from icha.datasets.labels import coarse_study, is_coarse_study, number_label
 from icha.path.targets import ESTIMATED_AT_TARGETS, ESTIMATED_OF_LOOPS
 from icha.support.rules import FloatRange
-from icha.support.values import LONGEST_LABEL, NOTHING, Problem, list_names
+from icha.support.values import LONGEST_LABEL, NOTHING, ROUNDING, Problem, list_names
 
 MAX_RUNS = 100_000
 # Largest number of targets of all runs together.
@@ -226,9 +226,16 @@ def _level_problems(campaign, label, study, surfaces):
             reason = f"is given beside `{given}`, which determines it. Remove the key"
             yield (*location[:2], key), getattr(study, key), reason
     for name in dict.fromkeys(surfaces):
-        if name in campaign.surfaces and not campaign.surfaces[name].random:
+        if name not in campaign.surfaces:
+            continue
+        surface, least = campaign.surfaces[name], 2 * MODELS[REFERENCE_MODEL].least_cells
+        if not surface.random:
             reason = f"the key needs random surfaces, but {name!r} has no seeds; expected only random surfaces"
             yield location, NOTHING, reason
+        elif study.seeds_of_levels.coarse and surface.cells_per_short_wave < least * (1 - ROUNDING):
+            reason = f"gives {surface.cells_per_short_wave:.3g} cells per shortest wavelength, but `{given}` of study "
+            reason += f"{label!r} needs {least}, because a level has half the grid; expected "
+            yield ("surfaces", name, "grid"), surface.grid, f"{reason}{surface.grid_of_cells(least)} or more"
     quantity = study.accuracy and study.accuracy.quantity
     if quantity in ESTIMATED_OF_LOOPS and not study.unload:
         yield (*location, "quantity"), quantity, "is a quantity of a loop; expected `unload: true` in this study"

@@ -172,6 +172,7 @@ class Targets(Section):
 
 
 EVERY_STOP = "every_stop"
+_OR_EVERY_STOP = OrSchema({"const": EVERY_STOP})
 
 
 def _list_or_word(value: Any, read_list: Callable[[Any], Any]) -> Any:
@@ -320,15 +321,15 @@ class Study(Section):
     levels: Levels | None = None
     """Seeds of three levels of accuracy, instead of `seeds` and `models`. ICHA estimates each result with an interval,
     and `icha answer` prints the estimates."""
-    accuracy: (
-        Annotated[Accuracy | None, BeforeValidator(_short_form), OrSchema({"type": "string", "examples": ["3 %"]})]
-    ) = None
+    accuracy: Annotated[
+        Accuracy | None, BeforeValidator(_short_form), OrSchema({"type": "string", "examples": ["3 %"]})
+    ] = None
     """Accuracy that the results must have, such as `3 %`, instead of `seeds` and `models`. `icha run` computes a pilot
     with few seeds, then the levels that reach the accuracy in the shortest time, and states the result."""
     targets: Targets
     """Targets of the loading path."""
     snapshots: (
-        Annotated[list[Snapshot], AfterValidator(distinct), WrapValidator(_list_or_word), OrSchema({"const": EVERY_STOP})] | None
+        Annotated[list[Snapshot], AfterValidator(distinct), WrapValidator(_list_or_word), _OR_EVERY_STOP] | None
     ) = None
     """States at which each run saves its contact spots and distributions. The path reaches each of these states
     exactly. `every_stop` means all targets. Default: the last target."""

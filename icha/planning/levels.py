@@ -5,6 +5,7 @@ the levels of least cost. The chosen seeds are in the file `levels.yaml` in the 
 `icha.configuration.load` reads. The configuration as used, and thus a deposit, contains them.
 """
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -56,7 +57,7 @@ class Choice(NamedTuple):
     @property
     def sentence(self) -> str:
         """The accuracy that was reached, beside the required one."""
-        reached = f"± {100 * self.half_width:.2g} %" if np.isfinite(self.half_width) else "no interval"
+        reached = f"± {100 * self.half_width:.2g} %" if math.isfinite(self.half_width) else "no interval"
         return f"{self.quantity} has {reached} ({100 * self.required:.3g} % required)"
 
 
@@ -76,7 +77,7 @@ def choose_levels(campaign: Campaign, results: Path, cores: int) -> dict[str, Ch
     costs = _costs(campaign, results)
     # Without the asperity model, the other levels may take less time.
     estimates = [estimate_campaign(tree, asperities=used) for used in (True, False)]
-    return {name: _choose(name, study, estimates, costs[name], cores) for name, study in studies.items()}
+    return {name: choose_for_study(name, study, estimates, costs[name], cores) for name, study in studies.items()}
 
 
 def _costs(campaign, results) -> dict[str, dict[str, float]]:
@@ -104,22 +105,21 @@ def quantity_of(accuracy: Accuracy, study: Study) -> str:
     return accuracy.quantity or ("nominal_pressure" if by_area else "contact_area_fraction")
 
 
-def _choose(name: str, study: Study, estimates, costs: Mapping[str, float], cores: int) -> Choice:
+def choose_for_study(name: str, study: Study, estimates, costs: Mapping[str, float], cores: int) -> Choice:
     """Return the choice of one study; `estimates` are the answers with and without the asperity model."""
     accuracy = study.accuracy
     quantity, required = quantity_of(accuracy, study), accuracy.half_width
     answers = [_answers(estimate, name, quantity) for estimate in estimates]
     if answers[0] is None:
         reason = f"no run has a result for {quantity}; look at the runs that ended early"
-        return Choice(quantity, np.inf, required, {}, 0.0, reason)
+        return Choice(quantity, math.inf, required, {}, 0.0, reason)
     half_width = float(np.log(answers[0]["estimate_high"] / answers[0]["estimate"]).max())
-    present = {level: int(answers[0][counts].max()) for level, counts in LEVELS.items()}
+    present = {level: len(getattr(study.seeds_of_levels, level) or ()) for level in LEVELS}
     if half_width <= required:
         return Choice(quantity, half_width, required, {}, _seconds(costs, present))
     budget = accuracy.budget and accuracy.budget * cores
-    choices = [_least_cost(each, costs, required, budget) for each in answers if each is not None]
-    counts, reason = min(choices, key=lambda choice: (bool(choice[1]), _seconds(costs, choice[0])))
-    counts = {level: max(count, present[level]) for level, count in counts.items()}
+    choices = [_least_cost(each, costs, required, budget, present) for each in answers if each is not None]
+    _, _, counts, reason = min(choices, key=lambda choice: choice[:2])
     if all(count == present[level] for level, count in counts.items()):
         counts = {}
     return Choice(quantity, half_width, required, counts, _seconds(costs, counts or present), reason)
@@ -137,20 +137,30 @@ def _seconds(costs, counts) -> float:
     return sum(costs.get(level, 0.0) * count for level, count in counts.items())
 
 
-def _least_cost(answers: xr.Dataset, costs, required: float, budget: float | None) -> tuple[dict[str, int], str]:
-    """Return the numbers of seeds of least cost, and the reason if they cannot reach the required half-width."""
+def _least_cost(
+    answers: xr.Dataset, costs, required: float, budget: float | None, present
+) -> tuple[float, float, dict, str]:
+    """Return expected half-width, time and numbers of seeds of least cost, and why the half-width is not `required`.
+
+    `present` has the number of computed seeds of each level; all of them are used.
+    """
     per_seed, grid = variances_per_seed(answers)
+
+    def counts_for(half_width):
+        counts = allocate(per_seed, grid, costs, half_width)
+        return {level: max(count, present[level]) for level, count in counts.items()}
+
     try:
-        counts = allocate(per_seed, grid, costs, required)
+        counts = counts_for(required)
     except ValueError as error:
-        return {}, str(error)
+        return math.inf, math.inf, {}, str(error)
     half_width, reason = required, ""
     while budget is not None and _seconds(costs, counts) > budget:
         reason, half_width = "the budget does not suffice", _WIDER * half_width
         if half_width > 1:
-            return {}, reason
-        counts = allocate(per_seed, grid, costs, half_width)
-    return counts, reason
+            return math.inf, math.inf, {}, reason
+        counts = counts_for(half_width)
+    return half_width, _seconds(costs, counts), counts, reason
 
 
 def words_of_levels(counts: Mapping[str, int]) -> str:

@@ -7,7 +7,9 @@ import subprocess
 import sys
 import time
 
+import numpy as np
 import pytest
+import xarray as xr
 import yaml
 from conftest import REPOSITORY, copy_project, modules_of, snakemake
 from tiny_campaign import CAMPAIGN as TINY
@@ -199,3 +201,23 @@ def test_the_reason_of_snakemake_is_printed_without_traceback():
     assert _reason_in(output) == ["Reason 1"]
     trace = 'Traceback (most recent call last):\n\n  File "a.py", line 3, in f\n    open(x)\n\nPermissionError: no\n'
     assert _reason_in(output + trace) == ["Reason 1", "PermissionError: no"]
+
+
+@pytest.mark.slow
+def test_an_accuracy_is_reached_with_seeds_that_stay(tmp_path):
+    project = copy_project(REPOSITORY, tmp_path / "project")
+    asked = TINY.replace("grid: 32", "grid: 40").replace("[bare, soft]", "[bare]")
+    asked = asked.replace("seeds: [1, 2]", "accuracy: 20 %")
+    (project / "config/campaigns/tiny.yaml").write_text(asked)
+    output = run(project)
+    assert "next: " in output and "checks of the solved equations passed" in output
+    used = yaml.safe_load((project / "results/tiny/config.used.yaml").read_text())
+    chosen = yaml.safe_load((project / "results/tiny/levels.yaml").read_text())["load"]
+    assert used["studies"]["load"]["levels"] == chosen
+    with xr.open_datatree(project / "results/tiny/aggregated/answers.nc") as answers:
+        study = answers["load"].to_dataset()
+        area = study.isel(answer=(study["quantity"] == "contact_area_fraction").values)
+        reached = float(np.log(area["estimate_high"] / area["estimate"]).max())
+    assert f"contact_area_fraction has ± {100 * reached:.2g} % (20 % required)" in output.splitlines()[-1]
+    assert reached <= 0.2 or "Not reached" in output.splitlines()[-1]
+    assert "Nothing to do" in run(project)
