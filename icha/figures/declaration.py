@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import Field
 
@@ -159,6 +159,21 @@ class SnapshotFigure(StudyFigure):
         if arguments.pop("snapshot", None) is not None:
             arguments["kind"], arguments["target"] = self.snapshot.kind_and_value
         return arguments
+
+
+class UnitsFigure(FigureOptions):
+    """A figure in reduced or in physical units."""
+
+    units: Literal["reduced", "physical"] = Field(
+        default="reduced",
+        description="`reduced`: loads in units of E* h'rms, separations in units of the rms height. `physical`: "
+        "nominal pressures in Pa and mean gaps in m, with prefixes.",
+    )
+
+    def arguments(self, campaign: Campaign) -> dict[str, Any]:
+        """Return the arguments of `figure`; the default units are left out."""
+        arguments = super().arguments(campaign)
+        return {name: value for name, value in arguments.items() if (name, value) != ("units", "reduced")}
 
 
 class TopographyFigure(StudyFigure):

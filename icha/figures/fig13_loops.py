@@ -12,8 +12,16 @@ from icha.datasets import results
 from icha.datasets.labels import ContactLabels
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
 from icha.figures import select
-from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, SEPARATION_LABEL
-from icha.figures.declaration import Campaign, Declaration, Inputs, TopographyFigure, TruthFigure, UnloadedFigure
+from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, SEPARATION_LABEL, Axis, physical_units
+from icha.figures.declaration import (
+    Campaign,
+    Declaration,
+    Inputs,
+    TopographyFigure,
+    TruthFigure,
+    UnitsFigure,
+    UnloadedFigure,
+)
 from icha.figures.looks import (
     BRANCH_DASHES,
     MODEL_MARKERS,
@@ -29,7 +37,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-class LoopsFigure(TruthFigure, TopographyFigure, UnloadedFigure):
+class LoopsFigure(UnitsFigure, TruthFigure, TopographyFigure, UnloadedFigure):
     """A figure of the runs of a study in loading and unloading, on one topography."""
 
 
@@ -62,9 +70,9 @@ _LOOP = {"lw": 0.9}
 _PULL_OFF = {"ls": "none", "mec": "black", "mew": 0.7, "ms": 4.6, "zorder": 6}
 _TRUTH = {"ls": "none", "ms": 3.6, "mew": 0.7, "zorder": 5}
 _TRUTH_MARKERS = {"loading": MODEL_MARKERS, "unloading": UNLOADING_MARKERS}
-# Variables along x and y of the two panels.
-_LOADS = ("reduced_separation", "reduced_pressure")
-_AREAS = ("reduced_pressure", "contact_area_fraction")
+# Variables along x and y of the two panels; `separation` and `load` are in the units of the figure.
+_LOADS = ("separation", "load")
+_AREAS = ("load", "contact_area_fraction")
 
 
 class _Loop(NamedTuple):
@@ -93,6 +101,7 @@ def figure(
     boundary_elements: str | None = None,
     surface: str | None = None,
     seed: int | None = None,
+    units: str = "reduced",
 ) -> Figure:
     """Draw the runs of all slopes and materials of a study on one topography.
 
@@ -102,6 +111,7 @@ def figure(
     loops : datasets of loading and unloading with boundary elements at finite ranges, if there are any. Only loops on
         the topography of the figure are shown.
     surface, seed : labels of the topography. Default: surface and seed of the first complete run.
+    units : "reduced" or "physical".
     """
     from icha.analysis.model_error import difference_of_contacts
 
@@ -113,10 +123,18 @@ def figure(
     # Slopes that have their own panels need no markers.
     contacts = [(labels.material, labels.surface, None if own_rows else labels.rms_slope) for labels, _ in runs]
     looks = looks_of_studies(campaign, [study], contacts)
+    pressure, gap = Axis(PRESSURE_LABEL, 1.0), Axis(SEPARATION_LABEL, 1.0)
+    if units == "physical":
+        pressure, gap = physical_units(campaign[study].to_dataset())
     drawn = []
     for (labels, run), contact in zip(runs, contacts, strict=True):
         look = looks.look(contact, applicable=select.is_applicable(run))
         beside = [truth for truth in truths if not difference_of_contacts(run, truth)]
+        factors = 1.0, 1.0
+        if units == "physical":
+            pressure_unit = float(run["contact_modulus"] * run["unit_slope"])
+            factors = pressure_unit * pressure.factor, float(run["unit_height"]) * gap.factor
+        run, *beside = (_in_units(each, *factors) for each in (run, *beside))
         drawn.append(_Loop(labels.rms_slope, run, beside, look))
 
     rows = [[slope] for slope in slopes] if own_rows else [slopes]
@@ -127,16 +145,21 @@ def figure(
             for ax, names in ((left, _LOADS), (right, _AREAS)):
                 _draw(ax, loop, names, turn=len(shown) > 1)
         _enlarge(left, shown_loops)
-        left.set_ylabel(PRESSURE_LABEL)
+        left.set_ylabel(pressure.label)
         right.set_ylabel(AREA_LABEL)
         if own_rows:
             right.set_title(slope_label(shown[0]), loc="right")
-    panels[-1, 0].set_xlabel(SEPARATION_LABEL)
-    panels[-1, 1].set_xlabel(PRESSURE_LABEL)
+    panels[-1, 0].set_xlabel(gap.label)
+    panels[-1, 1].set_xlabel(pressure.label)
     labels, _ = runs[0]
     panels[0, 0].set_title(f"surface {surface_label(campaign, labels.surface)}, seed {labels.seed}", loc="right")
     legend_below(fig, _handles(looks, drawn, marked=len(rows[0]) > 1))
     return fig
+
+
+def _in_units(run, pressure, separation):
+    """Return a run with the variables `load` and `separation`: reduced values, multiplied by two factors."""
+    return run.assign(load=run["reduced_pressure"] * pressure, separation=run["reduced_separation"] * separation)
 
 
 def _draw(ax, loop, names, *, turn):

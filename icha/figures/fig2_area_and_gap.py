@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
-from pydantic import Field
 
 from icha.contact.models import REFERENCE_MODEL
 from icha.datasets import results
@@ -17,6 +16,7 @@ from icha.figures.declaration import (
     Declaration,
     Inputs,
     StudyFigure,
+    UnitsFigure,
     dataset_and_theories,
     is_solved_at_finite_range,
 )
@@ -38,20 +38,8 @@ def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles)
     return found
 
 
-class AreaAndGapFigure(StudyFigure):
-    """A figure of all runs of a study, in reduced or in physical units."""
-
-    units: Literal["reduced", "physical"] = Field(
-        default="reduced",
-        description="`reduced`: loads in units of E* h'rms, separations in units of the rms height. `physical`: "
-        "nominal pressures in Pa and mean gaps in m, with prefixes. Theories are then shown only if all runs have the "
-        "same modulus and slope.",
-    )
-
-    def arguments(self, campaign: Campaign) -> dict[str, Any]:
-        """Return the arguments of `figure`; the default units are left out."""
-        arguments = super().arguments(campaign)
-        return {name: value for name, value in arguments.items() if (name, value) != ("units", "reduced")}
+class AreaAndGapFigure(UnitsFigure, StudyFigure):
+    """A figure of all runs of a study. In physical units, theories are shown if all runs have one modulus and slope."""
 
 
 DECLARATION = Declaration(
