@@ -97,12 +97,32 @@ def _print_run(run, file: Path) -> None:
     if "gap/h_rms" in curves:
         echo("          u: distance from mean plane to undeformed half-space; gap: mean gap between the surfaces")
     if "hysteresis_loss" in run:
-        tension = format_quantity(-float(run["pull_off_pressure"]), "Pa")
+        tension = format_quantity(float(run["pull_off_pressure"]), "Pa")
         echo(f"pull-off: {tension} of tension; loss {float(run['hysteresis_loss']):.3g} J/m²")
+    if "pull_off_force" in run:
+        echo(f"          {_indenter_test(run)}")
+    shown = np.unique(np.linspace(0, steps - 1, min(steps, MOST_ROWS)).round().astype(int))
+    if "force" in run:
+        echo("\n  step      force, N   indentation, m   contact radius, m")
+        for k in shown:
+            force, indentation, radius = (float(run[name][k]) for name in ("force", "indentation", "contact_radius"))
+            echo(f"{k:>6}  {force:>12.4e}   {indentation:>14.4e}   {radius:>17.4e}")
+        return
     echo("\n  step      p/(E* h'rms)   A/A0         u/h_rms    spots")
-    for k in np.unique(np.linspace(0, steps - 1, min(steps, MOST_ROWS)).round().astype(int)):
+    for k in shown:
         pressure, area, separation, spots = (float(run[name][k]) for name in COLUMNS)
         echo(f"{k:>6}  {pressure:>16.4e}   {area:.4e}   {separation:>8.4f}   {spots:>6.0f}")
+
+
+def _indenter_test(run) -> str:
+    """Return the pull-off force of an indenter, its ratio to JKR, and the works of adhesion of the fits, as text."""
+    parts = [f"pull-off force {format_quantity(float(run['pull_off_force']), 'N')}"]
+    if "pull_off_force_over_jkr" in run:
+        parts[0] += f" ({float(run['pull_off_force_over_jkr']):.4g} of JKR)"
+    for branch in ("approach", "retraction"):
+        if (name := f"work_of_adhesion_{branch}") in run:
+            parts.append(f"{branch} {format_quantity(float(run[name]), 'J/m²')}")
+    return ", ".join(parts)
 
 
 def _print_surface(surface, file: Path) -> None:
@@ -131,8 +151,9 @@ def _print_surface(surface, file: Path) -> None:
 
 def _print_campaign(tree, file: Path) -> None:
     """Print, for each study of a campaign, its size, models, ranges of results and failed runs."""
+    from icha.datasets.campaign import run_place, runs_of_status
     from icha.datasets.labels import LABELS, labels_at
-    from icha.datasets.variables.campaign import BEYOND_MODEL
+    from icha.datasets.variables.campaign import BEYOND_MODEL, LOADED_RUNS
 
     echo(f"{file}: {printable(tree.attrs.get('title', 'campaign'))}")
     echo(printable(" ".join(str(tree.attrs.get("summary", "")).split())))
@@ -149,6 +170,12 @@ def _print_campaign(tree, file: Path) -> None:
             values = study[variable].values
             if (known := values[values == values]).size:
                 echo(f"  {label:<6} {known.min():.3g} to {known.max():.3g}")
+        if "pull_off_force" in study:
+            for labels in runs_of_status(study, name, LOADED_RUNS):
+                run = study.isel(run_place(study, labels))
+                if run["pull_off_force"].notnull():
+                    known = run[[each for each in run if run[each].ndim == 0 and run[each].notnull()]]
+                    echo(f"  {printable(labels.path.partition('/')[2])}: {_indenter_test(known)}")
         if reasons := reasons_not_applicable(study):
             first = printable(". ".join(list(reasons)[:3]))
             echo(f"  model not applicable to {format_count(reasons.total(), 'run')}: {first}", fg="red")

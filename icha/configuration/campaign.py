@@ -28,6 +28,7 @@ from icha.configuration.studies import (
 from icha.configuration.surfaces import AnySurface, MaterialSection
 from icha.contact.models import MODELS
 from icha.datasets.labels import is_coarse_study
+from icha.path.targets import FORCE, INDENTATION, QUANTITIES
 from icha.support.input_files import read_columns
 from icha.support.values import ROUNDING, Name, Problem, Section, Text, distinct
 
@@ -246,6 +247,7 @@ class Campaign(Section):
         for label, study in self.studies.items():
             yield from _within(("studies", label), study.problems(self.snapshots_of(label), *self._units(label)))
             yield from _within(("studies", label), self._model_problems(study))
+            yield from _within(("studies", label), self._edge_problems(study))
         sections = {section: getattr(self, section) for section in (*BESIDE_STUDIES, "measurements")}
         for section, entries in (sections | {"figures": self.figures.by_name()}).items():
             for label, entry in entries.items():
@@ -302,6 +304,27 @@ class Campaign(Section):
                     f"{surface.cells_per_short_wave:.3g}; expected asperities, or a `grid` of {enough} or more for "
                     f"{name!r} (better {better})",
                 )
+
+    def _edge_problems(self, study: Study) -> Iterator[Problem]:
+        """Yield a problem for each sphere whose contact is larger than its square, by the theory of JKR or Hertz."""
+        kind, value = study.targets.last
+        spheres = {name: self.surfaces[name].shape for name in study.surfaces if self.surfaces[name].shape}
+        for (name, shape), label in itertools.product(spheres.items(), study.materials):
+            radius, material = shape.shape.sphere_radius, self.materials[label]
+            side = getattr(self._grid_and_period(name), "period", math.inf)
+            if radius is None or material.thickness or kind not in (FORCE, INDENTATION):
+                continue
+            from icha.references import indentation
+
+            contact_radius = {
+                FORCE: indentation.sphere_radius_at_force,
+                INDENTATION: indentation.sphere_radius_at_indentation,
+            }[kind]
+            a = float(contact_radius(value, radius, material.contact_modulus, material.surface_energy))
+            if 2 * a > side:
+                reason = f"gives {label!r} on {name!r} a contact radius of about {a:.3g} m, but the square has "
+                reason += f"the side {side:.3g} m; expected a side of at least {3 * a:.2g} m, or smaller targets"
+                yield ("targets", QUANTITIES[kind].plural), value, reason
 
     def warnings(self) -> list[str]:
         """Return a warning for each random surface whose grid is valid but coarse."""

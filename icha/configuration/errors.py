@@ -30,6 +30,7 @@ _REASONS = {
     "model_attributes_type": _NOT_A_SECTION,
     "bool_type": "is neither true nor false; expected true or false",
     "dict_type": "is not a mapping; expected names with their sections",
+    "list_type": "is not a list; expected a list in brackets, such as [value, value]",
     "string_type": "is not text; expected text (in quotes if the text looks like a number)",
 }
 

@@ -46,6 +46,7 @@ class Usual(NamedTuple):
         return f"{'0 or ' if self.or_zero else ''}{self.least} to {self.most} ({self.why})"
 
 
+_MODULUS = Usual("Pa", "1 kPa", "2000 GPa", "from soft gels to diamond on a rigid body, 1150 GPa")
 _SIDE = Usual("m", "1 nm", "1 m", "from a few atoms to a machine part")
 _WAVE = Usual("m", "0.1 nm", "1 m", "from an atom to a machine part")
 _RADIUS = Usual("m", "1 nm", "10 m", "from the tip of a microscope to a nearly flat lens")
@@ -54,7 +55,8 @@ _OF_ENERGY = "van der Waals forces give 10 to 200 mJ/m^2, clean metals 1 to 3 J/
 _OF_RANGE = "chemical bonds have less than 1 nm, van der Waals forces some nm; a coarse grid may need some 100 nm"
 # Usual values by key. The ranges contain every reasonable value and exclude most values with a wrong unit prefix.
 USUAL = {
-    "contact_modulus": Usual("Pa", "1 kPa", "2000 GPa", "from soft gels to diamond on a rigid body, 1150 GPa"),
+    "contact_modulus": _MODULUS,
+    "youngs_modulus": _MODULUS,
     "surface_energy": Usual("J/m^2", "0.001 mJ/m^2", "3 J/m^2", _OF_ENERGY, or_zero=True),
     "interaction_range": Usual("m", "0.05 nm", "1 um", _OF_RANGE),
     "period": _SIDE,

@@ -56,7 +56,7 @@ def figure(campaign: xr.DataTree, *, study: str) -> Figure:
             ax.plot(*np.transpose(means), marker=marker, color=colour, **_MEAN)
     ax.axhline(1, color=GREY, lw=0.6, zorder=0)
     ax.set(xlabel=f"rms height of the roughness ({unit})", ylabel=r"work of adhesion over $\Delta\gamma$")
-    ax.set_ylim(bottom=0)
+    ax.margins(y=0.15)
     handles = {}
     for material in materials:
         for quantity, (name, marker) in _QUANTITIES.items():

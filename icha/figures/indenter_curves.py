@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from icha.contact.models import REFERENCE_MODEL
 from icha.figures import select
 from icha.figures.declaration import Campaign, UnloadedFigure
 from icha.figures.looks import graded_colours
@@ -50,18 +51,23 @@ class Series(NamedTuple):
 def select_series(campaign: xr.DataTree, study: str) -> list[Series]:
     """Return the series of a study on free squares that unload, by increasing rms height.
 
+    If the study has boundary elements, the series are those of boundary elements.
+
     Raises
     ------
     NothingToDraw
         If no run is complete and unloads, or if no run is on a free square.
     """
-    runs = [(labels, run) for labels, run in select.select_unloaded_runs(campaign, study) if "force" in run]
+    # The asperity model is usually not applicable to conformal contact.
+    unloaded = select.select_unloaded_runs(campaign, study, REFERENCE_MODEL)
+    runs = [(labels, run) for labels, run in unloaded if "force" in run]
     if not runs:
         raise select.NothingToDraw(f"study {study}: no run is on a free square; expected surfaces with a shape")
     groups = sorted(select.group_by_contact(campaign, runs), key=_roughness)
     several = len({group.labels.material for group in groups}) > 1
     heights = list(dict.fromkeys(filter(None, map(_roughness, groups))))
-    palette = dict(zip(heights, graded_colours(len(heights)), strict=True))
+    # The darkest colour looks like black, which is that of smooth shapes.
+    palette = dict(zip(heights, graded_colours(len(heights) + 1)[1:], strict=True))
     found = []
     for group in groups:
         height = _roughness(group)

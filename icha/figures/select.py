@@ -254,8 +254,10 @@ def asked_of_entry(errors: xr.Dataset) -> int:
 ROUNDING = 1e-9
 
 
-def select_unloaded_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr.Dataset]]:
-    """Return the runs of a study that unload, without spots and events.
+def select_unloaded_runs(
+    campaign: xr.DataTree, study: str, model: str | None = None
+) -> list[tuple[RunLabels, xr.Dataset]]:
+    """Return the runs of a study that unload, without spots and events; `model` is the preferred model, if any.
 
     The reduced separation of these runs is the mean separation divided by the rms height, because the work is the
     integral of the pressure over the mean separation. The mean gap of a free square differs from the mean separation.
@@ -267,18 +269,19 @@ def select_unloaded_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLab
     """
     from icha.datasets.campaign import unit_height
 
-    runs = _select_runs_with(unloading_legs, campaign, study)
+    runs = _select_runs_with(unloading_legs, campaign, study, model)
     if not runs:
-        raise NothingToDraw(f"study {study}: no run was unloaded; expected a study that unloads")
+        raise NothingToDraw(f"study {study}: no run reached its unloading; `icha run` prints where the runs ended")
     return [(labels, run.assign(reduced_separation=run["mean_separation"] / unit_height(run))) for labels, run in runs]
 
 
-def _select_runs_with(condition, campaign, study):
-    """Return the runs of the `shown_model` that fulfil a condition; if none does, such runs of boundary elements.
+def _select_runs_with(condition, campaign, study, preferred=None):
+    """Return the runs of a preferred model that fulfil a condition; if none does, such runs of another model.
 
-    Near full contact, runs with asperities end before unloading, but runs with boundary elements may unload.
+    The default is the `shown_model`, then boundary elements. Near full contact, runs with asperities end before
+    unloading, but runs with boundary elements may unload.
     """
-    for model in (None, REFERENCE_MODEL):
+    for model in (preferred, None, REFERENCE_MODEL):
         runs = select_runs(campaign, study, ragged=False, model=model)
         if found := [(labels, run) for labels, run in runs if condition(run)]:
             break

@@ -91,10 +91,13 @@ def new_figure(width: float, height: float) -> Figure:
 def new_panels(
     height: float, rows: int = 1, columns: int = 2, *, width: float = TWO_COLUMNS, **options: object
 ) -> tuple[Figure, np.ndarray]:
-    """Return a figure and an array of panels with the marks (a), (b), …; `options` are those of `Figure.subplots`."""
+    """Return a figure and an array of panels; `options` are those of `Figure.subplots`.
+
+    Several panels have the marks (a), (b), ….
+    """
     figure = new_figure(width, height)
     panels = figure.subplots(rows, columns, squeeze=False, **options)
-    for axes, letter in zip(panels.ravel(), ascii_lowercase, strict=False):
+    for axes, letter in zip(panels.ravel() if panels.size > 1 else (), ascii_lowercase, strict=False):
         panel_label(axes, letter)
     return figure, panels
 

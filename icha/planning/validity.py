@@ -168,11 +168,14 @@ def _default_ranges(campaign):
 def _indenters(campaign):
     """Yield a statement for each sphere and adhesive material: what a smooth sphere would do by the theory of JKR."""
     contacts = dict.fromkeys((case.surface, case.material) for case in run_cases(campaign))
+    stated = set()
     for surface, name in contacts:
         shape, material = campaign.surfaces[surface].shape, campaign.materials[name]
         radius = shape.shape.sphere_radius if shape else None
-        if radius is None or not material.surface_energy or material.thickness:
+        same = radius, name, campaign.period(surface) / campaign.grid(surface)
+        if radius is None or not material.surface_energy or material.thickness or same in stated:
             continue
+        stated.add(same)
         force = 1.5 * math.pi * material.surface_energy * radius
         contact = math.cbrt(4.5 * math.pi * material.surface_energy * radius**2 / material.contact_modulus)
         cell = campaign.period(surface) / campaign.grid(surface)

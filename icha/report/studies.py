@@ -224,10 +224,14 @@ def _loop(runs: list[xr.Dataset]) -> dict:
         cells |= {
             "at": _with_unit(values("pull_off_separation") / values("unit_height")),
             "over_strength": _with_unit(values("pull_off_over_strength")),
-            "over_summits": _with_unit(values("pull_off_over_summits")),
+            # Boundary elements have no asperities, and one sphere is not a sum of asperities.
+            **({} if "force" in runs[0] else {"over_summits": _with_unit(values("pull_off_over_summits"))}),
             "detachment": _with_unit(values("detachment_pressure"), "Pa"),
             "over_energy": _with_unit(values("hysteresis_loss_over_surface_energy")),
         }
+    units = {"pull_off_force": "N", "pull_off_force_over_jkr": "", "work_of_adhesion_approach": "J/m²"}
+    units |= {"work_of_adhesion_retraction": "J/m²"}
+    cells |= {name: _with_unit(values(name), unit) for name, unit in units.items() if all(name in run for run in runs)}
     return cells | {
         "shares": {name: values(name).sum() / loss.sum() if lost.any() else None for name in LOSS_NAMES},
     }

@@ -92,3 +92,20 @@ def test_references_need_periodic_surfaces_and_half_spaces(refused):
 )
 def test_wrong_shapes_are_refused(changes, message, refused):
     refused("", changes, message)
+
+
+@pytest.mark.parametrize(
+    ("targets", "radius"), [({"forces": ["20 mN"]}, "5.51e-05"), ({"indentations": ["0 nm", "10 um"]}, "5.2e-05")]
+)
+def test_contacts_larger_than_the_square_are_refused(targets, radius, refused):
+    sphere = {"surfaces.rough.shape": {"sphere": {"radius": "0.25 mm"}}, "surfaces.rough.boundary": "free"}
+    changes = sphere | {"studies.one.models": ["boundary_elements"], "studies.one.targets": targets}
+    changes |= {"studies.one.snapshots": None}
+    # JKR by hand: a^3 = 3 R/(4 E*) (F + 3 pi w R + ...), and the indentation a^2/R - sqrt(2 pi w a/E*) is 10.01 um.
+    refused("", changes, f"gives 'soft' on 'rough' a contact radius of about {radius} m, but the square has the side")
+
+
+def test_an_unusual_youngs_modulus_is_refused(refused):
+    bodies = [{"youngs_modulus": "2 mPa", "poisson_ratio": 0.5}, "rigid"]
+    changes = {"materials.soft.contact_modulus": None, "materials.soft.bodies": bodies}
+    refused("", changes, "materials.soft.bodies[0].youngs_modulus: '2 mPa' is unusual; expected 1 kPa to 2000 GPa")

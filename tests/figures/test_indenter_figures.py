@@ -17,6 +17,7 @@ from icha.figures import (
     select,
 )
 from icha.figures.captions import caption_of
+from icha.figures.indenter_curves import select_series
 from icha.surfaces.shapes import Cone, Sphere
 
 SIDE, GRID, MODULUS, RADIUS = 48e-6, 48, 1e6, 1e-3
@@ -113,3 +114,10 @@ def test_statements_on_validity_if_surfaces_have_slopes_of_their_own():
     labels = [("smooth", 0.0), ("rough", 0.1), ("rough", 0.2), ("rough", 0.3)]
     runs = [(RunLabels("press", "boundary_elements", name, 0, slope, "soft"), run) for name, slope in labels]
     assert statements_on_dataset(campaign_tree(runs))
+
+
+def test_a_study_with_both_models_shows_boundary_elements():
+    labels = [RunLabels("press", model, "s0", 0, 0.1, "soft") for model in ("asperities", "boundary_elements")]
+    both = campaign_tree(zip(labels, (press(), press()), strict=True))
+    (series,) = select_series(both, "press")
+    assert series.runs.labels.model == "boundary_elements"
