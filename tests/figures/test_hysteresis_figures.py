@@ -402,7 +402,7 @@ def test_boundary_elements_are_drawn_where_no_run_with_asperities_unloads():
 
 @pytest.mark.parametrize("module", MODULES, ids=lambda module: module.__name__.split(".")[-1])
 def test_studies_that_do_not_unload_are_named(module):
-    with pytest.raises(ValueError, match="single: no run (reached its unloading|was unloaded)"):
+    with pytest.raises(ValueError, match=r"single: no run (reached its unloading|was unloaded)"):
         draw(module, small.tree(), "single")
 
 
