@@ -140,7 +140,7 @@ def define_group(
 
     def define(name, attributes, along, dims, dtype, width=0, fill=None):
         """Define a variable along labels and further dimensions; `width` is the length of texts in bytes."""
-        options = _storage(sizes, block, along, dims, width or 1)
+        options = _storage(sizes, block, along, dims, width)
         attributes = {**attributes, **({"coordinates": coordinates[name]} if name in coordinates else {})}
         options |= {} if width or fill is None else {"fill_value": fill}
         return define_variable(group, name, along + dims, dtype, attributes, width, **options)
@@ -194,7 +194,7 @@ def define_group(
 
 def _storage(sizes, block, along, dims, width):
     """Return the storage options of a variable: a large variable is compressed, one chunk per block of runs."""
-    shape = (*(sizes[dim] for dim in dims), *([width] if width > 1 else []))
+    shape = (*(sizes[dim] for dim in dims), *([width] if width else []))
     if math.prod(sizes[dim] for dim in along) * math.prod(shape) < LEAST_COMPRESSED:
         return {}
     if along != LABELS:
