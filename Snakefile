@@ -71,6 +71,7 @@ localrules:
     comparison,
     model_error,
     answers,
+    sensitivity,
     checks,
     verdict,
     figure,
@@ -112,6 +113,7 @@ rule dataset:
         FILES.comparison,
         FILES.model_error,
         FILES.answers,
+        FILES.sensitivity,
         FILES.checks,
         FILES.verdict,
 

@@ -39,6 +39,15 @@ def variances_per_seed(answers: xr.Dataset) -> tuple[dict[str, np.ndarray], np.n
     return per_seed, np.nan_to_num(answers["share_grid"].values) ** 2
 
 
+def half_width_of_seeds(answers: xr.Dataset) -> float:
+    """Return the largest relative half-width of some answers without the share of sampled parameters.
+
+    More seeds do not narrow this share.
+    """
+    shares = [answers[f"share_{name}"].values for name in ("seeds", "model", "refinement", "grid")]
+    return float(np.sqrt(np.sum(np.square(np.nan_to_num(shares)), axis=0)).max())
+
+
 def allocate(
     per_seed: Mapping[str, np.ndarray], grid: np.ndarray, costs: Mapping[str, float], accuracy: float
 ) -> dict[str, int]:

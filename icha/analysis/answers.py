@@ -40,7 +40,7 @@ class Answer(NamedTuple):
     quantity : name of the quantity in words.
     value, half_width : estimate and half-width of its interval in `unit`.
     unit : unit; "" for counts.
-    shares : half-width in `unit` by cause: seeds, model, grid.
+    shares : half-width in `unit` by cause: seeds, model, grid, inputs.
     limit : sentence that names what limits the accuracy.
     """
 
@@ -69,17 +69,19 @@ def answers_of(study: xr.Dataset) -> list[Answer]:
 
 def _answer(row: xr.Dataset) -> Answer:
     quantity, value = str(row["quantity"].item()), float(row["estimate"])
-    factor, unit = _unit(quantity, value, str(row["units"].item()))
-    shares = {name: float(row[f"share_{name}"]) for name in ("seeds", "model", "refinement", "grid")}
+    factor, unit = unit_words(quantity, value, str(row["units"].item()))
+    shares = {name: float(row[f"share_{name}"]) for name in ("seeds", "model", "refinement", "grid", "inputs")}
     known = {name: 0.0 if math.isnan(share) else share for name, share in shares.items()}
     causes = {"seeds": known["seeds"], "model": known["model"]}
     if not math.isnan(shares["grid"]):
         causes["grid"] = math.hypot(known["refinement"], known["grid"])
+    if not math.isnan(shares["inputs"]):
+        causes["inputs"] = known["inputs"]
     half = float(row["estimate_high"] - row["estimate_low"]) / 2
     kind = str(row["stop_kind"].item())
     return Answer(
         f"{row['material'].item()} on {row['surface'].item()}, h'rms = {float(row['rms_slope']):.4g}",
-        "" if kind == LOOP else _state(kind, float(row["stop_target"])),
+        "" if kind == LOOP else state_words(kind, float(row["stop_target"])),
         WORDS[quantity],
         value * factor,
         half * factor,
@@ -89,7 +91,7 @@ def _answer(row: xr.Dataset) -> Answer:
     )
 
 
-def _unit(quantity, value, unit):
+def unit_words(quantity: str, value: float, unit: str) -> tuple[float, str]:
     """Return a factor and a unit in which a value has few digits."""
     if quantity == "contact_area_fraction":
         return 100.0, "%"
@@ -101,7 +103,8 @@ def _unit(quantity, value, unit):
     return factor, prefixed + {"": "", "m^-1": "/m", "m^-2": "/m²"}[denominator]
 
 
-def _state(kind, target):
+def state_words(kind: str, target: float) -> str:
+    """Return the target of a state as text, such as `p* = 0.01` or `pressure 10 kPa`."""
     unit = UNITS.get(kind, "")
     words = kind.replace("_", " ")
     return f"{words} {format_quantity(target, unit)}" if unit else f"{_STOPS[kind]} = {target:g}"
@@ -117,7 +120,13 @@ def _limit(row, shares):
         for level in others
     }
     grid = 0.0 if math.isnan(shares["grid"]) else shares["grid"] ** 2
-    total = sum(variances.values()) + grid
+    inputs = 0.0 if math.isnan(shares["inputs"]) else shares["inputs"] ** 2
+    total = sum(variances.values()) + grid + inputs
+    if inputs > max(*variances.values(), grid):
+        return (
+            f"The sampled parameters limit the accuracy: ± {100 * math.sqrt(inputs):.2g} % of the value. Better known "
+            "parameters would narrow it; more seeds would not."
+        )
     if not total:
         return "The seeds do not differ."
     if grid > max(variances.values()):

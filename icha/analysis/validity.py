@@ -17,7 +17,7 @@ from icha.asperity.full_contact import FULL_CONTACT_BELOW, HIGH_PULL_OFF_BELOW, 
 from icha.asperity.material import WU_HOLDS_FROM
 from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets.attributes import reasons_not_applicable
-from icha.datasets.labels import LABELS, is_coarse_study
+from icha.datasets.labels import LABELS, is_derived_study
 from icha.datasets.variables.campaign import COMPUTED_RUNS
 from icha.support.formatting import format_count, format_quantity
 from icha.surfaces.moments import RESOLVED_CELLS, cells_per_short_wave, error_of_cells
@@ -255,7 +255,7 @@ def statements_on_dataset(campaign: xr.DataTree) -> list[Statement]:
     """
     models, cases, shares, sticky = {}, [], {}, {}
     for name, node in campaign.children.items():
-        if is_coarse_study(name, campaign.children):
+        if is_derived_study(name, campaign.children):
             continue  # the estimates correct the error of the coarse grid
         study = node.to_dataset()
         models[name] = [str(model) for model in study["model"].values]

@@ -20,21 +20,28 @@ def answer(
     `accuracy`, `icha run` chooses these seeds.
     """
     from icha.analysis.answers import answers_of, as_csv, as_latex, paragraph
+    from icha.analysis.sample_words import sample_table
     from icha.datasets.files import read_campaign
-    from icha.datasets.results import ANSWERS
+    from icha.datasets.results import ANSWERS, SENSITIVITY
 
     folder = Path(results) if Path(results).is_dir() else project() / "results" / results
-    file = folder / ANSWERS
-    if not file.is_file():
+    file, sampled = folder / ANSWERS, folder / SENSITIVITY
+    if not file.is_file() and not sampled.is_file():
         raise UserError(
-            f"{file}: there are no answers; expected a campaign with `levels`, or with boundary elements for several "
-            "seeds, that `icha run` has computed"
+            f"{file}: there are no answers; expected a campaign with `levels`, with boundary elements for several "
+            "seeds, or with `sample`, that `icha run` has computed"
         )
-    tree = read_campaign(file)
+    tree = read_campaign(file) if file.is_file() else None
+    if (csv or latex) and tree is None:
+        raise UserError(f"{file}: there are no estimates with intervals; the sampled cases are in {sampled}")
     if csv or latex:
         echo(as_csv(tree).rstrip("\n") if csv else "\n".join(as_latex(tree)))
         return
-    for name, node in tree.children.items():
+    if sampled.is_file():
+        for node in read_campaign(sampled).children.values():
+            echo(sample_table(node.to_dataset()))
+            echo()
+    for name, node in tree.children.items() if tree else ():
         answers = answers_of(node.to_dataset())
         echo(paragraph(name, answers))
         for each in answers:

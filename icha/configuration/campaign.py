@@ -27,7 +27,7 @@ from icha.configuration.studies import (
 )
 from icha.configuration.surfaces import AnySurface, MaterialSection
 from icha.contact.models import MODELS
-from icha.datasets.labels import is_coarse_study
+from icha.datasets.labels import is_derived_study
 from icha.path.targets import FORCE, INDENTATION, QUANTITIES
 from icha.support.input_files import read_columns
 from icha.support.values import ROUNDING, Name, Problem, Section, Text, distinct
@@ -330,7 +330,7 @@ class Campaign(Section):
         """Return a warning for each random surface whose grid is valid but coarse."""
         expected: dict[str, int] = {}
         for label, study in self.studies.items():
-            if is_coarse_study(label, self.studies):
+            if is_derived_study(label, self.studies):
                 continue
             least = _ADVISABLE_CELLS if any(MODELS[model].by_cells for model in study.models) else _LEAST_CELLS
             expected |= {name: max(least, expected.get(name, 0)) for name in study.surfaces}

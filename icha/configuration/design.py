@@ -11,19 +11,19 @@ import math
 import re
 from collections.abc import Iterator, Mapping
 from decimal import Decimal
-from typing import Any, get_args
+from typing import Any
 
 from pydantic import ValidationError
 
 from icha.configuration.campaign import BESIDE_STUDIES, Campaign, Contact
 from icha.configuration.errors import MOST_PROBLEMS, problem_of
+from icha.configuration.samples import RULES
 from icha.configuration.studies import MEASURED, SCALARS, RmsHeight, Study, slope_of_height
 from icha.configuration.surfaces import SURFACE_KINDS, MaterialSection
 from icha.contact.models import DEFAULT_MODEL, MODELS, REFERENCE_MODEL
-from icha.datasets.labels import coarse_study, is_coarse_study, number_label
+from icha.datasets.labels import coarse_study, inputs_study, is_derived_study, number_label
 from icha.path.targets import ESTIMATED_AT_TARGETS, ESTIMATED_OF_LOOPS
-from icha.support.rules import FloatRange
-from icha.support.values import LONGEST_LABEL, NOTHING, ROUNDING, Problem, list_names
+from icha.support.values import LONGEST_LABEL, NOTHING, ROUNDING, Problem, list_names, rule_of
 
 MAX_RUNS = 100_000
 # Largest number of targets of all runs together.
@@ -39,6 +39,9 @@ _ORDER += tuple(_OF_MATERIAL)
 _SYMBOLS = {"m": "m", "Pa": "Pa", "J/m^2": "J"}
 _PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
+# Name under which a point of a sample has the name of its case. The case is part of the names of its variants, because
+# names with the values of all parameters would be long.
+_CASE = "case"
 # Location of a value in the configuration, and the value.
 _Located = tuple[tuple, Any]
 
@@ -65,9 +68,15 @@ def expand_design(campaign: Campaign, content: Mapping) -> tuple[Campaign, list[
     variants = _Variants(campaign, content)
     runs, studies = {}, {}
     for label, study in campaign.studies.items():
+        levels = study.seeds_of_levels
+        if study.sample is not None and levels is not None:
+            sampled = _study_of_inputs(study)
+            contacts = [variants.contact(point) for point in _points(label, sampled)]
+            runs[inputs_study(label)] = list(itertools.product(sampled.models, contacts))
+            studies[inputs_study(label)] = sampled
+            study = study.model_copy(update={"sample": None})
         contacts = [variants.contact(point) for point in _points(label, study)]
         runs[label], studies[label] = list(itertools.product(study.models, contacts)), study
-        levels = study.seeds_of_levels
         if study.error_check and levels is None:
             first = {contact._replace(seed=0): contact for contact in reversed(contacts)}
             runs[label] += [(REFERENCE_MODEL, contact) for contact in contacts if contact in first.values()]
@@ -81,6 +90,13 @@ def expand_design(campaign: Campaign, content: Mapping) -> tuple[Campaign, list[
     expanded = campaign.model_copy(update=sections | {"studies": studies}).with_runs(runs)
     expanded._origins = variants.origin
     return expanded, list(_too_many_solutions(expanded))
+
+
+def _study_of_inputs(study: Study) -> Study:
+    """Return the study of the sampled parameters of a study with levels: one seed, and the fastest of its models."""
+    levels = study.seeds_of_levels
+    models = [DEFAULT_MODEL if levels.asperities else REFERENCE_MODEL]
+    return study.model_copy(update={"levels": None, "accuracy": None, "seeds": [min(levels.seeds)], "models": models})
 
 
 def _runs_of_levels(label, levels, contacts, variants):
@@ -114,9 +130,12 @@ def _lists(label: str, study: Study) -> dict[str, list[_Located]]:
 
 def _points(label: str, study: Study) -> Iterator[dict[str, _Located]]:
     """Yield the parameters of each run of a study, each value with its location in the configuration."""
-    lists = _lists(label, study)
+    lists, sampled = _lists(label, study), study.sample is not None
     for index, given in enumerate(_cases(study)):
-        fixed = {name: (("studies", label, "cases", index, name), value) for name, value in given.items()}
+        place = ("sample", "parameters") if sampled else ("cases", index)
+        fixed = {name: (("studies", label, *place, name), value) for name, value in given.items()}
+        if sampled:
+            fixed[_CASE] = ("studies", label, "sample"), f"{label}-case{index}"
         axes = [
             [dict(zip(group, values, strict=True)) for values in zip(*(lists[name] for name in group), strict=True)]
             for group in _axes(study, lists, fixed)
@@ -126,7 +145,9 @@ def _points(label: str, study: Study) -> Iterator[dict[str, _Located]]:
 
 
 def _cases(study: Study) -> list[dict[str, Any]]:
-    """Return the values of each case of a study; a study without `cases` has one case without values."""
+    """Return the values of each case of a study; a study without `cases` and `sample` has one case without values."""
+    if study.sample is not None:
+        return study.sample.cases
     return [{}] if study.cases is None else [case.model_dump(exclude_none=True) for case in study.cases]
 
 
@@ -183,7 +204,9 @@ def _study_problems(campaign: Campaign, label: str, study: Study) -> Iterator[Pr
 
     for many, one in _LISTS.items():
         needed = not cases or any(getattr(case, one) is None for case in cases)
-        if one == "rms_slope":
+        if one == "rms_slope" and _samples_slopes(study):
+            needed = False
+        elif one == "rms_slope":
             names = (campaign.surfaces.get(name) for _, name in values("surface"))
             needed = needed and not all(surface and surface.smooth for surface in names)
             if study.rms_heights is not None:
@@ -198,10 +221,10 @@ def _study_problems(campaign: Campaign, label: str, study: Study) -> Iterator[Pr
             if name not in names:
                 yield location, name, f"is not defined; expected one of {list_names(names)}"
     yield from _zip_problems(prefix, study, lists)
-    if is_coarse_study(label, campaign.studies):
-        reason = (
-            "is the name of the runs of another study on half the grid; expected a name that does not end in -coarse"
-        )
+    if study.sample is not None:
+        yield from _sample_problems(prefix, study)
+    if is_derived_study(label, campaign.studies):
+        reason = "is the name of runs that ICHA adds to another study; expected a name without -coarse or -inputs"
         yield prefix, NOTHING, reason
     if study.error_check and list(study.models) != [DEFAULT_MODEL]:
         reason = "needs `models: [asperities]`, because other studies measure the error anyway. Remove the key"
@@ -215,6 +238,32 @@ def _study_problems(campaign: Campaign, label: str, study: Study) -> Iterator[Pr
         for name in [surface] if surface else study.surfaces:
             if name in campaign.surfaces and campaign.surfaces[name].random and not campaign.surfaces[name].from_file:
                 yield location, slope, f"needs a measured surface, but {name!r} is random; expected numbers"
+
+
+def _samples_slopes(study):
+    """Return whether all rms slopes of a study are sampled; the levels of accuracy need an rms slope of their own."""
+    sampled = study.sample is not None and "rms_slope" in study.sample.distributions
+    return sampled and study.seeds_of_levels is None
+
+
+def _sample_problems(prefix, study):
+    """Yield the problems of the key `sample` of a study."""
+    for key in ("vary", "zip", "cases"):
+        if getattr(study, key):
+            reason = "is given beside `sample`; expected one of both. Remove the key, or use separate studies"
+            yield (*prefix, key), NOTHING, reason
+    heights = study.rms_slopes + (study.rms_heights or [])
+    if _samples_slopes(study) and heights:
+        key = "rms_slopes" if study.rms_slopes else "rms_heights"
+        yield (*prefix, key), heights, "is given beside `rms_slope` in `sample`; expected one of both"
+    counts = {"surfaces": study.surfaces, "materials": study.materials}
+    counts["rms_heights" if study.rms_heights else "rms_slopes"] = heights
+    for key, values in counts.items():
+        if len(values) > 1:
+            reason = "has several entries, but every case of `sample` has one; expected one entry, or separate studies"
+            yield (*prefix, key), values, reason
+    for location, value, reason in study.sample.problems():
+        yield (*prefix, "sample", *location), value, reason
 
 
 def _level_problems(campaign, label, study, surfaces):
@@ -295,8 +344,9 @@ class _Variants:
             kinds = ", ".join(k for k, section in SURFACE_KINDS.items() if name in section.model_fields)
             reason = f"is not a key of surface {surface!r}; expected only surfaces of kind {kinds}, or separate studies"
             self.problems[location[:4]] = (location[:4], value, reason)
+        case = point[_CASE][1] if _CASE in point else None
         section, slope = self._campaign.surfaces[surface], point["rms_slope"][1]
-        variant = self._variant("surfaces", surface, of_surface)
+        variant = self._variant("surfaces", surface, of_surface, case)
         if section.smooth:
             slope = 0.0
         elif not section.from_file and isinstance(slope, RmsHeight):
@@ -306,7 +356,7 @@ class _Variants:
             variant,
             point["seed"][1] if section.random else 0,
             slope,
-            self._variant("materials", material, of_material),
+            self._variant("materials", material, of_material, case),
         )
 
     def on_half_grid(self, contact: Contact, study: str) -> Contact:
@@ -318,14 +368,14 @@ class _Variants:
         changes = {name: value for name, value in self._changes.get(base, {}).items() if name != "grid"}
         return contact._replace(surface=self._variant("surfaces", origin, changes | {"grid": half}))
 
-    def _variant(self, section: str, base: str, changes: Mapping[str, _Located]) -> str:
+    def _variant(self, section: str, base: str, changes: Mapping[str, _Located], case: str | None = None) -> str:
         """Return the name of a variant: a surface or material with changed values. Create the variant if it is new."""
-        key = (section, base, *((name, repr(value)) for name, (_, value) in changes.items()))
+        key = (section, base, case, *((name, repr(value)) for name, (_, value) in changes.items()))
         if changes and key not in self._names:
-            self._names[key] = self._make(section, base, changes)
+            self._names[key] = self._make(section, base, changes, case)
         return self._names[key] if changes else base
 
-    def _make(self, section: str, base: str, changes: Mapping[str, _Located]) -> str:
+    def _make(self, section: str, base: str, changes: Mapping[str, _Located], case: str | None) -> str:
         entries = getattr(self._campaign, section)
         values = {name: value for name, (_, value) in changes.items()}
         try:
@@ -340,7 +390,7 @@ class _Variants:
             return base
         if hasattr(variant, "path"):
             variant = variant.model_copy(update={"path": entries[base].path})
-        name = "-".join([base, *(f"{key}{value_label(variant, key)}" for key in changes)])
+        name = "-".join([base, *([case] if case else (f"{key}{value_label(variant, key)}" for key in changes))])
         if name in entries or len(name) > LONGEST_LABEL:
             reason = f"makes a variant of {base!r} with the name {name!r}; expected a name that no other entry has, and"
             reason += f" at most {LONGEST_LABEL} characters. Rename an entry"
@@ -358,9 +408,10 @@ def value_label(section, name: str) -> str:
         text = str(value)
         # If a text cannot be part of a file name, such as the name of a channel, its checksum is used instead.
         return text if re.fullmatch(r"[A-Za-z0-9_.+-]{1,40}", text) else hashlib.sha256(text.encode()).hexdigest()[:8]
-    unit = next((each.unit for each in type(section).model_fields[name].metadata if isinstance(each, FloatRange)), None)
-    if unit is None:
+    rule = rule_of(type(section).model_fields[name])
+    if rule is None or rule.unit == "1":
         return number_label(value)
+    unit = rule.unit
     exact = Decimal(repr(value))
     power = 3 * (exact.adjusted() // 3) if exact else 0
     power = min(max(power, min(_PREFIXES)), max(_PREFIXES))
@@ -372,8 +423,10 @@ def varied_values(campaign: Campaign) -> dict[str, dict[str, tuple[str, str, dic
     """Return, for each study, the varied parameters by name: label (surface or material), unit, and value by label."""
     found: dict[str, dict[str, tuple[str, str, dict]]] = {}
     for label, study in campaign.studies.items():
-        given = [study.vary, *(study.cases or ())]
-        names = dict.fromkeys(name for each in given if each for name in SCALARS if getattr(each, name) is not None)
+        given = [study.vary, *(study.cases or ()), study.sample and study.sample.parameters]
+        names = dict.fromkeys(
+            name for each in given if each for name in SCALARS if getattr(each, name, None) is not None
+        )
         for name in names:
             of_material = name in _OF_MATERIAL
             entries = campaign.materials if of_material else campaign.surfaces
@@ -384,10 +437,29 @@ def varied_values(campaign: Campaign) -> dict[str, dict[str, tuple[str, str, dic
     return found
 
 
+def sampled_parameters(campaign: Campaign) -> dict[str, tuple[list[tuple], dict[str, tuple]]]:
+    """Return surface, rms slope and material of each case of the studies with `sample`, and the sampled parameters.
+
+    For each parameter: unit, kind and numbers of its distribution, and its value in each case.
+    """
+    found = {}
+    for label, study in campaign.studies.items():
+        if study.sample is None:
+            continue
+        cases = [(each.surface, each.rms_slope, each.material) for each in campaign.contacts(label)]
+        values = study.sample.values
+        found[label] = (
+            list(dict.fromkeys(cases)),
+            {
+                name: (RULES[name].unit.replace("/m^2", " m^-2"), *distribution, [case[name] for case in values])
+                for name, distribution in study.sample.distributions.items()
+            },
+        )
+    return found
+
+
 def unit_of(section, name: str) -> str:
     """Return the SI unit of a key of a section, in the notation of CF; "" for a key without a unit."""
     field = type(section).model_fields.get(name)
-    # The type of a key without a default, such as `Length`, or one of the types in `Length | None`.
-    types = [field, *get_args(field.annotation)] if field else []
-    rules = [rule for each in types for rule in getattr(each, "metadata", None) or getattr(each, "__metadata__", ())]
-    return next((rule.unit.replace("/m^2", " m^-2") for rule in rules if isinstance(rule, FloatRange)), "")
+    rule = rule_of(field) if field else None
+    return rule.unit.replace("/m^2", " m^-2") if rule else ""

@@ -18,6 +18,7 @@ from pydantic import (
 
 from icha.asperity.cohesive_zone import resolution_problem
 from icha.asperity.material import Material
+from icha.configuration.samples import Sample
 from icha.configuration.surfaces import SURFACE_KINDS, MaterialSection, MeasuredSurface
 from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.path.snapshots import AreaFraction, Indentation, ReducedPressure, Snapshot
@@ -310,6 +311,9 @@ class Study(Section):
     cases: Annotated[list[Case], Field(min_length=1)] | None = None
     """Explicit list of runs, instead of all combinations. If a case has no value for a parameter, the parameter takes
     all values of the study."""
+    sample: Sample | None = None
+    """Cases whose parameters are drawn from distributions, instead of `vary`, `zip` and `cases`. ICHA computes which
+    share of the variance each parameter causes. The study needs one surface, one material and one rms slope."""
     models: Annotated[list[Literal[tuple(MODELS)]], Field(min_length=1), AfterValidator(distinct)] = [DEFAULT_MODEL]
     """Contact models of every run. `asperities` is fast. `boundary_elements` assumes a very short range of attraction,
     and needs a grid with at least 4 (better 8) cells per shortest wavelength. On a surface with free edges, boundary

@@ -27,6 +27,7 @@ _OTHERS = {
     "comparison of runs at common loads": "seed_count",
     "error of the model": "area_error",
     "answers of studies": "estimate_low",
+    "sampled cases of studies": "effect_value",
     "theories and published points": "bush_gibson_thomas_area_fraction",
     SOLUTION: "target_reduced_pressure",
     "boundary-element loop at a finite range": "dissipated",

@@ -37,9 +37,14 @@ def coarse_study(study: str) -> str:
     return f"{study}-coarse"
 
 
-def is_coarse_study(study: str, studies: Iterable[str]) -> bool:
-    """Return whether a study has the runs of another of the `studies` on half the grid."""
-    return any(coarse_study(other) == study for other in studies)
+def inputs_study(study: str) -> str:
+    """Return the name of the study with the sampled parameters of another study, which has levels of accuracy."""
+    return f"{study}-inputs"
+
+
+def is_derived_study(study: str, studies: Iterable[str]) -> bool:
+    """Return whether a study has runs that another of the `studies` needs: `coarse_study` or `inputs_study`."""
+    return any(study in (coarse_study(other), inputs_study(other)) for other in studies)
 
 
 class RunLabels(NamedTuple):

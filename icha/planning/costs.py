@@ -88,6 +88,7 @@ LAWS = {
     "comparison": PowerLaw(0.07, 0.003, {"runs": 1}),
     "model_error": PowerLaw(0.07, 0.05, {"runs": 1}),
     "answers": PowerLaw(0.1, 0.003, {"runs": 1}),
+    "sensitivity": PowerLaw(0.1, 0.003, {"runs": 1}),
     "checks": PowerLaw(0.06, 0.006, {"runs": 1}),
     "figure": PowerLaw(1.3, 0.007, {"runs": 1}),
     "map": PowerLaw(0, 9.5e-8, {"nodes": 1}),

@@ -10,11 +10,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
 import xarray as xr
 import yaml
 
-from icha.analysis.allocation import LEVELS, allocate, variances_per_seed
+from icha.analysis.allocation import LEVELS, allocate, half_width_of_seeds, variances_per_seed
 from icha.analysis.estimates import estimate_campaign
 from icha.configuration.campaign import Campaign
 from icha.configuration.studies import Accuracy, Study
@@ -113,7 +112,7 @@ def choose_for_study(name: str, study: Study, estimates, costs: Mapping[str, flo
     if answers[0] is None:
         reason = f"no run has a result for {quantity}; look at the runs that ended early"
         return Choice(quantity, math.inf, required, {}, 0.0, reason)
-    half_width = float(np.log(answers[0]["estimate_high"] / answers[0]["estimate"]).max())
+    half_width = half_width_of_seeds(answers[0])
     present = {level: len(getattr(study.seeds_of_levels, level) or ()) for level in LEVELS}
     if half_width <= required:
         return Choice(quantity, half_width, required, {}, _seconds(costs, present))

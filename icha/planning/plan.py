@@ -184,6 +184,7 @@ def _derived_files(campaign, files: CampaignFiles, computed: list[Item]) -> Iter
         ("comparison", [files.comparison], 2, [files.dataset], runs, 0.03 * disk + 90e3),
         ("model_error", files.model_error, 2, [files.dataset, *beside], len(beside), 150e3),
         ("answers", files.answers, 2, [files.dataset], runs, 100e3),
+        ("sensitivity", files.sensitivity, 2, [files.dataset], runs, 100e3),
         ("checks", [files.checks], 2, [files.dataset, *files.solutions], runs, 5e3 * runs),
     ]
     for rule, paths, stage, inputs, count, disk_of_table in tables:

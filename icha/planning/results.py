@@ -22,6 +22,7 @@ class CampaignFiles:
     compared : labels of each boundary-element run in a study with both models, by path.
     model_error : path of the file of model errors; empty if there are no boundary-element results.
     answers : path of the file of answers; empty if no study has boundary elements for several seeds.
+    sensitivity : path of the file of sampled cases; empty if no study has `sample`.
     """
 
     surfaces: dict[str, tuple[str, int]]
@@ -35,6 +36,7 @@ class CampaignFiles:
     compared: dict[str, RunLabels]
     model_error: list[str]
     answers: list[str]
+    sensitivity: list[str]
     checks: str
     verdict: str
     figures: list[str]
@@ -60,6 +62,7 @@ class CampaignFiles:
             self.comparison,
             *self.model_error,
             *self.answers,
+            *self.sensitivity,
             self.checks,
             self.verdict,
             *self.figures,
@@ -93,7 +96,8 @@ def campaign_files(campaign: Campaign, folder: str = "") -> CampaignFiles:
         comparison=path(results.COMPARISON),
         compared=compared,
         model_error=[path(results.MODEL_ERROR)] if compared or solutions else [],
-        answers=[path(results.ANSWERS)] if _has_answers(runs.values()) else [],
+        answers=[path(results.ANSWERS)] if _has_answers(campaign, runs.values()) else [],
+        sensitivity=[path(results.SENSITIVITY)] if any(each.sample for each in campaign.studies.values()) else [],
         checks=path(results.CHECKS),
         verdict=path(results.VERDICT),
         figures=[
@@ -108,10 +112,10 @@ def campaign_files(campaign: Campaign, folder: str = "") -> CampaignFiles:
     )
 
 
-def _has_answers(cases):
+def _has_answers(campaign, cases):
     """Return whether boundary elements have several seeds of the same contact, so that a study has answers."""
     seeds: dict[RunLabels, set[int]] = {}
     for case in cases:
-        if case.model == REFERENCE_MODEL:
+        if case.model == REFERENCE_MODEL and campaign.studies[case.study].sample is None:
             seeds.setdefault(case._replace(seed=0), set()).add(case.seed)
     return any(len(each) > 1 for each in seeds.values())

@@ -28,7 +28,7 @@ from icha.configuration.plausibility import energy_ratio
 from icha.configuration.surfaces import SelfAffineSurface
 from icha.configuration.topographies import read_surface
 from icha.contact.models import MODELS
-from icha.datasets.labels import is_coarse_study
+from icha.datasets.labels import is_derived_study
 from icha.support.formatting import format_quantity
 from icha.surfaces.moments import (
     SpectralMoments,
@@ -110,7 +110,7 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
     facts_of = cache(lambda surface: surface_facts(campaign, surface))
     cases, tabor, sticky = [], {}, {}
     for case in run_cases(campaign):
-        if campaign.surfaces[case.surface].smooth or is_coarse_study(case.study, campaign.studies):
+        if campaign.surfaces[case.surface].smooth or is_derived_study(case.study, campaign.studies):
             continue  # a single contact, or runs whose error the estimates correct
         facts, by_summits = facts_of(case.surface), MODELS[case.model].by_summits
         material = Material(**campaign.materials[case.material].model_dump(exclude_none=True))
@@ -139,7 +139,7 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
             key = case.surface, case.material
             sticky[key] = max(value, sticky.get(key, 0.0))
     models = {
-        name: study.models for name, study in campaign.studies.items() if not is_coarse_study(name, campaign.studies)
+        name: study.models for name, study in campaign.studies.items() if not is_derived_study(name, campaign.studies)
     }
     outside = _describe_outside(tabor) if tabor else None
     stated = statements(models, cases, outside, describe_sticky(sticky))

@@ -17,6 +17,7 @@ import xarray as xr
 
 from icha.analysis.answers import answers_of, paragraph
 from icha.analysis.checks import worst
+from icha.analysis.sample_words import sample_rows
 from icha.analysis.validity import statements_on_dataset
 from icha.checks.findings import Check
 from icha.contact.models import MODEL_PAPER
@@ -59,6 +60,7 @@ def write_report(
     checks: Iterable[Check],
     model_error: xr.DataTree | None = None,
     answers: xr.DataTree | None = None,
+    sensitivity: xr.DataTree | None = None,
     surfaces: Iterable[xr.Dataset] = (),
     configuration: str = "",
     dataset_path: str | os.PathLike | None = None,
@@ -77,6 +79,7 @@ def write_report(
     checks : results of `icha.analysis.checks.check_campaign`.
     model_error : result of `icha.analysis.model_error.model_error`; None for a campaign without boundary elements.
     answers : result of `icha.analysis.estimates.estimate_campaign`; None without answers.
+    sensitivity : result of `icha.analysis.sensitivity.sensitivity_of_campaign`; None without sampled parameters.
     surfaces : datasets of the surfaces, with or without heights, for statistics and power spectra.
     configuration : text of the configuration as used.
     dataset_path : file of the campaign dataset, to which the page links.
@@ -95,6 +98,7 @@ def write_report(
         "report.html",
         **_content(campaign, list(checks), model_error, list(surfaces)),
         answers=[] if answers is None else [_answers(name, node) for name, node in answers.children.items()],
+        samples=[] if sensitivity is None else list(map(_sample, sensitivity.children.values())),
         most_rows=MOST_ROWS,
         folded=FOLDED_ROWS,
         paper=MODEL_PAPER.line,
@@ -139,6 +143,18 @@ def _answers(name, node):
     """Return the answers of a study for the page: name, paragraph and rows of a table."""
     rows = answers_of(node.to_dataset())
     return {"study": name, "paragraph": paragraph(name, rows).partition(": ")[2], "rows": rows}
+
+
+def _sample(node):
+    """Return the sampled cases of a study for the page: name, number of cases, parameters and rows of a table."""
+    data = node.to_dataset()
+    parameters = [f"{name} ({data[name].attrs.get('distribution', '')})" for name in data["parameter"].values]
+    return {
+        "study": data.attrs["study"],
+        "cases": data.sizes["case"],
+        "parameters": parameters,
+        "rows": sample_rows(data),
+    }
 
 
 def _pictures(figures: Sequence[ReportFigure], campaign: xr.DataTree, link) -> list[dict]:

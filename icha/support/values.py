@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from decimal import Decimal
 from functools import cache, lru_cache
 from itertools import pairwise
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 
@@ -188,7 +188,7 @@ def number(rule: FloatRange):
     """Return the type of a number without a unit, within the bounds of `rule`."""
     bounds = {"exclusiveMinimum": rule.above, "minimum": rule.least, "maximum": rule.most}
     schema = {"type": "number"} | {key: bound for key, bound in bounds.items() if bound is not None}
-    return _float(to_number, rule, rule.expected, schema)
+    return _float(to_number, rule, rule.expected, schema, rule)
 
 
 def _float(convert, rule, expected, schema, *metadata):
@@ -204,6 +204,14 @@ def _float(convert, rule, expected, schema, *metadata):
         return result
 
     return Annotated[float, BeforeValidator(read), WithJsonSchema(schema), *metadata]
+
+
+def rule_of(field: Any) -> FloatRange | None:
+    """Return the bounds and the unit of a field of a section; None for a field that is not a real number."""
+    # The type of a key without a default, such as `Length`, or one of the types in `Length | None`.
+    types = [field, *get_args(field.annotation)]
+    rules = [rule for each in types for rule in getattr(each, "metadata", None) or getattr(each, "__metadata__", ())]
+    return next((rule for rule in rules if isinstance(rule, FloatRange)), None)
 
 
 def integer(rule: IntegerRange):

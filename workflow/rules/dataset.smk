@@ -1,8 +1,8 @@
 # Rules for the configuration as used, the campaign dataset (all runs, one group for each study), the comparison of the
-# runs at common loads, the error of the asperity model, estimates with intervals, the checks of all results, and the verdict.
+# runs at common loads, the error of the asperity model, estimates with intervals, sampled parameters, checks and verdict.
 
 from icha.configuration.cases import campaign_sha256
-from icha.configuration.design import varied_values
+from icha.configuration.design import sampled_parameters, varied_values
 from icha.deposit.metadata import discovery_attributes
 from icha.support.checksums import sha256_of
 
@@ -161,6 +161,30 @@ rule answers:
         "Estimates with intervals"
     script:
         "../scripts/estimate_answers.py"
+
+
+rule sensitivity:
+    input:
+        FILES.dataset,
+    output:
+        "<results>/aggregated/sensitivity.nc",
+    log:
+        "<logs>/sensitivity.log",
+    benchmark:
+        "<benchmarks>/sensitivity.jsonl"
+    conda:
+        "../envs/icha.yaml"
+    resources:
+        mem_mb=4000,
+        runtime=30,
+    params:
+        samples=as_it_is(sampled_parameters(CAMPAIGN)),
+        attributes=as_it_is(ATTRIBUTES),
+        code=code_of("analyse_samples.py"),
+    message:
+        "Sensitivity of the results to sampled parameters"
+    script:
+        "../scripts/analyse_samples.py"
 
 
 rule checks:

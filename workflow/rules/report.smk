@@ -11,6 +11,7 @@ rule report_page:
         checks=FILES.checks,
         model_error=FILES.model_error,
         answers=FILES.answers,
+        sensitivity=FILES.sensitivity,
         configuration=FILES.configuration,
         surfaces=list(FILES.surfaces),
         figures=FILES.figures,

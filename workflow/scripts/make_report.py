@@ -18,7 +18,9 @@ if "snakemake" in globals():
         model_error = "".join(files.model_error)  # empty without boundary elements
         linked = {"Configuration": files.configuration, "Comparison": files.comparison, "Checks": files.checks}
         answers = "".join(files.answers)  # empty without boundary elements for several seeds
+        sensitivity = "".join(files.sensitivity)  # empty without sampled parameters
         linked |= {"Answers": answers} if answers else {}
+        linked |= {"Sampled cases": sensitivity} if sensitivity else {}
         linked |= {"Times and memory of the jobs": times} | ({"Error of the model": model_error} if model_error else {})
         campaign, errors = read_campaign(files.campaign), read_campaign(model_error) if model_error else None
         shown = []
@@ -34,6 +36,7 @@ if "snakemake" in globals():
             checks=read_checks(files.checks),
             model_error=errors,
             answers=read_campaign(answers) if answers else None,
+            sensitivity=read_campaign(sensitivity) if sensitivity else None,
             surfaces=[read_surface_statistics(path) for path in files.surfaces],
             configuration=Path(files.configuration).read_text(encoding="utf-8"),
             dataset_path=files.campaign,

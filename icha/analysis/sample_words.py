@@ -1,0 +1,50 @@
+"""The results of sampled cases in words: middle, range, and the share of variance that each parameter causes."""
+
+import itertools
+import math
+
+import xarray as xr
+
+from icha.analysis.answers import WORDS, state_words, unit_words
+from icha.contact.models import MODELS
+
+
+def sample_rows(data: xr.Dataset) -> list[dict]:
+    """Return a row of texts for each result: `result`, `middle`, `range`, `shares` by parameter, and `unexplained`."""
+    rows = []
+    for k in range(data.sizes.get("response", 0)):
+        row = data.isel(response=k)
+        quantity, number = str(row["response_quantity"].item()), int(row["response_target"])
+        factor, unit = unit_words(quantity, float(row["middle"]), data[quantity].attrs["units"])
+        state = f" at {state_words(*(data[key].values[number] for key in ('stop_kind', 'stop_target')))}"
+        model = f", {MODELS[str(row['response_model'].item())].words}" if data.sizes["model"] > 1 else ""
+        low, middle, high = (f"{float(row[name]) * factor:.3g}" for name in ("low", "middle", "high"))
+        shares = [
+            "" if math.isnan(share) else f"{100 * share:.0f} ± {100 * half:.0f} %"
+            for share, half in zip(row["first_order"].values, row["first_order_half_width"].values, strict=True)
+        ]
+        error = float(row["unexplained"])
+        rows.append(
+            {
+                "result": f"{WORDS[quantity]}{state if number >= 0 else ''}{model}",
+                "middle": f"{middle} {unit}".strip(),
+                "range": f"{low} to {high} {unit}".strip(),
+                "shares": shares,
+                "unexplained": "" if math.isnan(error) else f"{100 * min(error, 1):.2g} %",
+            }
+        )
+    return rows
+
+
+def sample_table(data: xr.Dataset) -> str:
+    """Return the results of sampled cases as a table for a terminal."""
+    names = data["parameter"].values.tolist()
+    lines = [["result", "middle", "90 % of cases", *names, "unexplained"]]
+    lines += [[r["result"], r["middle"], r["range"], *r["shares"], r["unexplained"]] for r in sample_rows(data)]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    table = ["  ".join(text.ljust(width) for text, width in zip(line, widths, strict=True)).rstrip() for line in lines]
+    head = (
+        f"{data.attrs['study']}: {data.sizes['case']} cases. Columns of parameters: share of the variance of the "
+        "logarithm that the parameter alone causes"
+    )
+    return "\n".join(itertools.chain([head], (f"  {line}" for line in table)))

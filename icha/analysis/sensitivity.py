@@ -1,0 +1,149 @@
+"""Results of the cases of a study with `sample`, and the share of their variance that each parameter causes."""
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+import xarray as xr
+
+from icha.analysis.estimates import CONTACT, LOOP, stops_of, values_of
+from icha.analysis.polynomial_chaos import Expansion, expand
+from icha.datasets.attributes import DERIVED, combine_attributes
+from icha.datasets.build import build_dataset, stack_rows
+from icha.datasets.labels import place_of
+from icha.datasets.variables.sensitivity import SENSITIVITY
+from icha.path.targets import ESTIMATED_AT_TARGETS, ESTIMATED_OF_LOOPS
+from icha.support.distributions import KINDS, Distribution
+
+# Surface, rms slope and material of each case, and for each sampled parameter: unit, kind and numbers of its
+# distribution, and its value in each case.
+Sampled = tuple[Sequence[tuple], Mapping[str, tuple]]
+
+_SUMMARY = "Results of sampled cases, and the shares of their variance that the parameters cause."
+# Number of values at which the effect of a parameter alone is computed, and the range of their probabilities.
+_NODES, _TAIL = 21, 0.05
+
+
+def sensitivity_of_campaign(
+    tree: xr.DataTree, samples: Mapping[str, Sampled], *, attrs: Mapping[str, str] = {}
+) -> xr.DataTree:
+    """Return a tree with one group for each study with `sample`; `attrs` are further global attributes.
+
+    The variables are those of `icha.datasets.variables.sensitivity`, and the sampled parameters along `case`.
+    """
+    groups = {f"/{name}": _sensitivity(tree[name].to_dataset(), name, *samples[name]) for name in samples}
+    root = combine_attributes("Sampled cases of every study", _SUMMARY, DERIVED, [g.attrs for g in groups.values()])
+    return xr.DataTree.from_dict({"/": xr.Dataset(attrs=root | dict(attrs))} | groups)
+
+
+def _sensitivity(study, name, cases, parameters):
+    """Return the dataset of one study."""
+    stops = stops_of(study)
+    results = _results(study, cases, stops)
+    distributions = {key: Distribution(*of_parameter[1:4]) for key, of_parameter in parameters.items()}
+    columns = {key: np.array(of_parameter[4]) for key, of_parameter in parameters.items()}
+    points = np.column_stack([each.standardise(columns[key]) for key, each in distributions.items()])
+    levels = np.linspace(_TAIL, 1 - _TAIL, _NODES)
+    nodes = np.array([each.quantile(levels) for each in distributions.values()])
+    models, kinds = study["model"].values.tolist(), [kind for kind, _ in stops]
+    rows = list(_responses(models, kinds, results, points, list(distributions.values()), nodes))
+    sizes = {"parameter": len(parameters), "node": _NODES}
+    values = stack_rows(SENSITIVITY, rows, "response", sizes) if rows else {}
+    values |= (
+        results
+        | {
+            "case": np.arange(len(cases)),
+            "model": models,
+            "seed": study["seed"].values,
+            "target": np.arange(len(stops)),
+            "stop_kind": kinds,
+            "stop_target": [target for _, target in stops],
+            "parameter": list(parameters),
+            "effect_value": nodes,
+        }
+        | dict(zip(CONTACT, zip(*cases, strict=True), strict=True))
+    )
+    described = combine_attributes(f"Sampled cases of study {name}", _SUMMARY, DERIVED, [study.attrs])
+    data = build_dataset(SENSITIVITY, values, described | {"study": name})
+    # A sampled rms slope is already among the coordinates.
+    return data.assign_coords(
+        {key: ("case", columns[key], _attributes(key, of)) for key, of in parameters.items() if key != "rms_slope"}
+    )
+
+
+def _attributes(name, of_parameter):
+    unit, kind, first, second, _ = of_parameter
+    described = f"{kind}: {KINDS[kind][0]} {first:.9g}, {KINDS[kind][1]} {second:.9g}"
+    return {"units": unit, "long_name": f"sampled {name.replace('_', ' ')}", "distribution": described}
+
+
+def _results(study: xr.Dataset, cases: Sequence[tuple], stops: Sequence[tuple]) -> dict[str, np.ndarray]:
+    """Return each quantity of each case, with NaN where a run has no result."""
+    places = [place_of(study, dict(zip(CONTACT, case, strict=True))) for case in cases]
+    index = tuple(np.array([place[label] for place in places]) for label in CONTACT)
+    found = {}
+    for quantity in (*ESTIMATED_AT_TARGETS, *ESTIMATED_OF_LOOPS):
+        if quantity not in study:
+            continue
+        of_loop = quantity in ESTIMATED_OF_LOOPS
+        columns = [
+            [
+                values_of(study, model, quantity, kind, target)[0][:, *index].astype(float)
+                for kind, target in ([(LOOP, 0.0)] if of_loop else stops)
+            ]
+            for model in study["model"].values
+        ]
+        values = np.moveaxis(np.array(columns), 1, -1)
+        found[quantity] = values[..., 0] if of_loop else values
+    return found
+
+
+def _responses(models, kinds, results, points, distributions, nodes) -> Iterator[dict]:
+    """Yield a row for each model, quantity and target with results: statistics and indices over the cases."""
+    normal = [each.is_normal for each in distributions]
+    at = np.array([each.standardise(row) for each, row in zip(distributions, nodes, strict=True)])
+    for (quantity, values), (m, model) in itertools.product(results.items(), enumerate(models)):
+        targets = range(values.shape[-1]) if values.ndim == len(("model", "seed", "case", "target")) else [-1]
+        for target in targets:
+            if target >= 0 and kinds[target] in ESTIMATED_AT_TARGETS[quantity]:
+                continue  # prescribed
+            column = np.abs(values[m] if target < 0 else values[m, ..., target])
+            # The logarithm of zero contact area, for example, is not finite.
+            known = (np.isfinite(column) & (column > 0)).all(axis=0)
+            if not known.any():
+                continue
+            logarithms = np.log(column[:, known]).mean(axis=0)
+            low, high = np.exp(np.quantile(logarithms, [_TAIL, 1 - _TAIL]))
+            found = expand(points[known], normal, logarithms)
+            yield {
+                "response_model": model,
+                "response_quantity": quantity,
+                "response_target": target,
+                "case_count": int(known.sum()),
+                "middle": math.exp(logarithms.mean()),
+                "low": low,
+                "high": high,
+            } | _indices(found, at, normal)
+
+
+def _indices(found: Expansion | None, at, normal):
+    """Return the indices and main effects of a fitted polynomial; NaN without polynomial."""
+    if found is None:
+        nothing = np.full(len(at), np.nan)
+        names = ("first_order", "total_order", "first_order_half_width", "total_order_half_width")
+        return {"degree": 0, "unexplained": np.nan, "main_effect": np.full(at.shape, np.nan)} | dict.fromkeys(
+            names, nothing
+        )
+    first, total = found.indices(found.coefficients)
+    width_first, width_total = found.half_widths()
+    effects = [found.main_effect(k, row, normal=normal[k]) for k, row in enumerate(at)]
+    return {
+        "degree": found.degree,
+        "unexplained": found.error,
+        "first_order": first,
+        "total_order": total,
+        "first_order_half_width": width_first,
+        "total_order_half_width": width_total,
+        "main_effect": np.exp(effects),
+    }

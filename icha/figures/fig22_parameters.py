@@ -1,0 +1,88 @@
+"""Fig. 22: a result against each sampled parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from pydantic import Field
+
+from icha.analysis.answers import WORDS, unit_words
+from icha.figures.declaration import Campaign, Declaration
+from icha.figures.looks import legend_below
+from icha.figures.samples import SampleFigure, best_model, responses, sample_inputs, scale_of, title_of
+from icha.figures.select import NothingToDraw
+from icha.figures.style import BLUE, TWO_COLUMNS, VERMILLION, in_style, legend_handle, logarithmic_axes, new_panels
+from icha.path.targets import ESTIMATED_AT_TARGETS, ESTIMATED_OF_LOOPS
+from icha.support.values import Problem
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+
+class ParametersFigure(SampleFigure):
+    """A figure of one result of the sampled cases of a study."""
+
+    quantity: Literal[(*ESTIMATED_AT_TARGETS, *ESTIMATED_OF_LOOPS)] = Field(
+        default="contact_area_fraction", description="Result to show."
+    )
+
+    def study_problems(self, campaign: Campaign, study) -> Iterator[Problem]:
+        """Also yield a problem for a quantity of a loop if the study does not unload."""
+        yield from super().study_problems(campaign, study)
+        if self.quantity in ESTIMATED_OF_LOOPS and not study.unload:
+            yield ("quantity",), self.quantity, "is a quantity of a loop; expected a study with `unload: true`"
+
+
+DECLARATION = Declaration(
+    description="A result of the sampled cases against each sampled parameter, with its mean over the others.",
+    options=ParametersFigure,
+    inputs=sample_inputs,
+)
+_COLUMNS = 3
+# The axis of the result is logarithmic if the largest value is so many times the smallest.
+_DECADE = 5.0
+
+
+@in_style
+def figure(
+    sensitivity: xr.DataTree, *, study: str, target: int = -1, quantity: str = "contact_area_fraction"
+) -> Figure:
+    """Draw one panel for each parameter: a point for each case, and the mean over the other parameters as a line."""
+    data = sensitivity[study].to_dataset()
+    shown = responses(data, target)
+    shown = shown.isel(response=(shown["response_quantity"] == quantity).values)
+    if not shown.sizes["response"]:
+        raise NothingToDraw(f"study {study}: no case has a result for {WORDS[quantity]}")
+    row = shown.isel(response=0)
+    number = int(row["response_target"])
+    values = np.abs(data[quantity].sel(model=best_model(data["model"].values.tolist())))
+    values = np.exp(np.log((values if number < 0 else values.isel(target=number)).where(lambda v: v > 0)).mean("seed"))
+    factor, unit = unit_words(quantity, float(row["middle"]), data[quantity].attrs["units"])
+    results = values.values * factor
+    names = data["parameter"].values.tolist()
+    columns = min(len(names), _COLUMNS)
+    rows = -(-len(names) // columns)
+    width = TWO_COLUMNS * columns / _COLUMNS if columns > 1 else 0.5 * TWO_COLUMNS
+    fig, panels = new_panels(2.0 * rows + 0.3, rows, columns, width=width, sharey=True)
+    for k, ax in enumerate(panels.ravel()):
+        if k >= len(names):
+            ax.remove()
+            continue
+        scale, label = scale_of(data, names[k])
+        ax.plot(data[names[k]].values * scale, results, "o", ms=3.2, mfc="none", mec=BLUE, mew=0.7)
+        if int(row["degree"]):
+            ax.plot(data["effect_value"].values[k] * scale, row["main_effect"].values[k] * factor, color=VERMILLION)
+        ax.set_xlabel(label)
+        if k % columns == 0:
+            ax.set_ylabel(f"{WORDS[quantity]} ({unit})" if unit else WORDS[quantity])
+    if np.nanmax(results) > _DECADE * np.nanmin(results):
+        logarithmic_axes(panels[0, 0], "y")
+    words = title_of(data, row)
+    handles = {f"one case: {words}": legend_handle(ls="none", marker="o", mfc="none", mec=BLUE, ms=3.2, mew=0.7)}
+    if int(row["degree"]):
+        handles["mean over the other parameters"] = legend_handle(color=VERMILLION)
+    legend_below(fig, handles)
+    return fig

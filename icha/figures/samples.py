@@ -1,0 +1,97 @@
+"""Data of the figures of studies with `sample`: results at one target, and the names of parameters and quantities."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from pydantic import Field
+
+from icha.analysis.answers import WORDS, state_words
+from icha.contact.models import MODELS, first_model
+from icha.datasets import results
+from icha.figures.declaration import Campaign, Inputs, StudyFigure
+from icha.figures.select import NothingToDraw
+from icha.support.formatting import choose_unit
+from icha.support.values import Problem
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Symbols of parameters; other parameters are written as words.
+_SYMBOLS = {
+    "hurst": "$H$",
+    "contact_modulus": r"$E^{\ast}$",
+    "surface_energy": r"$\Delta\gamma$",
+    "rms_slope": r"$h′_{\mathrm{rms}}$",
+    "rolloff_wavelength": r"$\lambda_r$",
+    "short_wavelength": r"$\lambda_s$",
+}
+
+
+class SampleFigure(StudyFigure):
+    """A figure of the sampled cases of a study."""
+
+    target: int = Field(default=-1, ge=-1, description="Number of the target, from 0. Default (-1): the last target.")
+
+    def study_problems(self, campaign: Campaign, study) -> Iterator[Problem]:
+        """Yield a problem if the study has no `sample`, or not this target."""
+        if study.sample is None:
+            yield ("study",), self.study, "has no sampled cases; expected a study with `sample`"
+        last = len(study.targets.states) - 1
+        if self.target > last:
+            yield ("target",), self.target, f"is not the number of a target; expected -1, 0, … {last}"
+
+
+def sample_inputs(campaign: Campaign, options: SampleFigure, files: results.ResultFiles) -> Inputs:
+    """Return the path of the file of sampled cases."""
+    return {"sensitivity": files.path(results.SENSITIVITY)}
+
+
+def responses(data: xr.Dataset, target: int) -> xr.Dataset:
+    """Return the results at one target and of the whole loop, for the model that is closest to the truth.
+
+    Raises
+    ------
+    NothingToDraw
+        If no case has a result there.
+    """
+    number = data.sizes["target"] - 1 if target < 0 else target
+    if "response" not in data.dims:
+        raise NothingToDraw(f"study {data.attrs['study']}: no case has a result")
+    models = data["response_model"].values.tolist()
+    shown = data["response_target"].isin((number, -1)) & (data["response_model"] == best_model(models))
+    if not shown.any():
+        raise NothingToDraw(f"study {data.attrs['study']}: no case has a result at target {number}")
+    return data.isel(response=shown.values)
+
+
+def best_model(models: Sequence[str]) -> str:
+    """Return boundary elements if a study has them, otherwise the asperity model."""
+    return next((name for name in reversed(MODELS) if name in models), first_model(models))
+
+
+def title_of(data: xr.Dataset, row: xr.Dataset) -> str:
+    """Return quantity and state of a result, such as `contact area at p* = 0.01`."""
+    number = int(row["response_target"])
+    words = WORDS[str(row["response_quantity"].item())]
+    if number < 0:
+        return words
+    kind, target = str(data["stop_kind"].values[number]), float(data["stop_target"].values[number])
+    return f"{words} at {state_words(kind, target)}"
+
+
+def symbol(name: str) -> str:
+    """Return the symbol of a parameter, or its name in words."""
+    return _SYMBOLS.get(name, name.replace("_", " "))
+
+
+def scale_of(data: xr.Dataset, name: str) -> tuple[float, str]:
+    """Return factor and label of the axis of a parameter."""
+    unit = data[name].attrs["units"]
+    if unit == "1":
+        return 1.0, symbol(name)
+    numerator, _, denominator = unit.partition(" ")
+    factor, prefixed = choose_unit(float(np.abs(data[name].values).max()), numerator)
+    return factor, f"{symbol(name)} ({prefixed}{'/m²' if denominator else ''})"
