@@ -152,10 +152,11 @@ def paragraph(name: str, answers: list[Answer]) -> str:
         numbers = "; ".join(f"{each.quantity} {each.number}" for each in main)
         at = f" at {state}" if state else ""
         found.append(f"{contact}{at}: {numbers}. {main[0].limit}")
+    inputs = " They include the scatter of the sampled parameters." if "inputs" in answers[0].shares else ""
     return (
         f"{name}: "
         + " ".join(found)
-        + f" Intervals contain the mean over all realisations in {100 * PROBABILITY:g} % of cases."
+        + f" Intervals contain the mean over all realisations in {100 * PROBABILITY:g} % of cases.{inputs}"
     )
 
 

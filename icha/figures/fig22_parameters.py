@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from pydantic import Field
 
-from icha.analysis.answers import WORDS, unit_words
 from icha.figures.declaration import Campaign, Declaration
 from icha.figures.looks import legend_below
 from icha.figures.samples import SampleFigure, best_model, responses, sample_inputs, scale_of, title_of
-from icha.figures.select import NothingToDraw
 from icha.figures.style import BLUE, TWO_COLUMNS, VERMILLION, in_style, legend_handle, logarithmic_axes, new_panels
 from icha.path.targets import ESTIMATED_AT_TARGETS, ESTIMATED_OF_LOOPS
 from icha.support.values import Problem
@@ -51,6 +49,9 @@ def figure(
     sensitivity: xr.DataTree, *, study: str, target: int = -1, quantity: str = "contact_area_fraction"
 ) -> Figure:
     """Draw one panel for each parameter: a point for each case, and the mean over the other parameters as a line."""
+    from icha.analysis.answers import WORDS, unit_words
+    from icha.figures.select import NothingToDraw
+
     data = sensitivity[study].to_dataset()
     shown = responses(data, target)
     shown = shown.isel(response=(shown["response_quantity"] == quantity).values)

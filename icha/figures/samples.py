@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pydantic import Field
 
-from icha.analysis.answers import WORDS, state_words
 from icha.contact.models import MODELS, first_model
 from icha.datasets import results
 from icha.figures.declaration import Campaign, Inputs, StudyFigure
-from icha.figures.select import NothingToDraw
 from icha.support.formatting import choose_unit
 from icha.support.values import Problem
 
@@ -57,6 +55,8 @@ def responses(data: xr.Dataset, target: int) -> xr.Dataset:
     NothingToDraw
         If no case has a result there.
     """
+    from icha.figures.select import NothingToDraw
+
     number = data.sizes["target"] - 1 if target < 0 else target
     if "response" not in data.dims:
         raise NothingToDraw(f"study {data.attrs['study']}: no case has a result")
@@ -74,6 +74,8 @@ def best_model(models: Sequence[str]) -> str:
 
 def title_of(data: xr.Dataset, row: xr.Dataset) -> str:
     """Return quantity and state of a result, such as `contact area at p* = 0.01`."""
+    from icha.analysis.answers import WORDS, state_words
+
     number = int(row["response_target"])
     words = WORDS[str(row["response_quantity"].item())]
     if number < 0:

@@ -74,7 +74,7 @@ studies:
     campaign = load_configuration(tmp_path / "c.yaml").campaign
     assert len(run_cases(campaign)) == 4
     assert unit_of(campaign.materials["soft-surface_energy1mJ"], "thickness") == "m"
-    assert unit_of(campaign.surfaces["rough-short_wavelength20um"], "hurst") == ""
+    assert unit_of(campaign.surfaces["rough-short_wavelength20um"], "hurst") == "1"
     assert varied_values(campaign)["one"] == {
         "short_wavelength": (
             "surface",

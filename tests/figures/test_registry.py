@@ -20,7 +20,7 @@ def test_reading_a_configuration_does_not_wait_for_libraries_that_draw(tmp_path)
 
 def test_figures_are_in_the_order_of_their_numbers_and_captions_are_sentences():
     numbers = [figure_number(name) for name in DECLARATIONS]
-    assert numbers == sorted(set(numbers)) and len(numbers) == 19
+    assert numbers == sorted(set(numbers)) and len(numbers) == 21
     for name in DECLARATIONS:
         assert callable(figure_module(name).figure)
         caption = caption_of(name)
