@@ -21,7 +21,7 @@ import numpy as np
 from scipy.stats import t as students_t
 
 import icha
-from icha.analysis.control_variates import PROBABILITY, estimate_mean
+from icha.analysis.control_variates import PROBABILITY, estimate_quantity
 from validation.tables import Table, write_tables
 
 FILE = Path("results/answers.csv")
@@ -119,13 +119,12 @@ def read_rows():
 
 
 def read_values():
-    """Return logarithms of values by case, level and seed, and seconds per run by case and level."""
+    """Return values by case, level and seed, and seconds per run by case and level."""
     values, seconds = defaultdict(lambda: defaultdict(dict)), defaultdict(lambda: defaultdict(list))
     for hurst, waves, grid, ratio, level, _, seed, quantity, pressure, value, duration in read_rows():
-        if float(value):
-            case = (hurst, waves, int(grid), ratio, quantity, float(pressure))
-            values[case][level][int(seed)] = math.log(abs(float(value)))  # pull-off pressures are negative
-            seconds[case][level].append(float(duration))
+        case = (hurst, waves, int(grid), ratio, quantity, float(pressure))
+        values[case][level][int(seed)] = abs(float(value))  # pull-off pressures are negative
+        seconds[case][level].append(float(duration))
     return values, seconds
 
 
@@ -142,15 +141,16 @@ def judge(levels, plan):
             level: {seed: levels[level][seed] for seed in groups.get(level, ()) if seed in levels[level]}
             for level in LEVELS
         }
-        found = estimate_mean(chosen["asperities"], chosen["coarse"], chosen["fine"])
+        found = estimate_quantity(chosen["asperities"], chosen["coarse"], chosen["fine"])
         rest = np.array([value for seed, value in fine.items() if not first <= seed < first + most])
-        if found is None or len(rest) < 8:
+        if found is None or len(rest) < 8 or not found.value:
             continue
+        rest = np.log(rest / found.value) if found.logarithmic else rest / found.value - 1
         quantile = students_t.ppf(0.5 * (1 + PROBABILITY), len(rest) - 1)
         error_of_truth = quantile * rest.std(ddof=1) / math.sqrt(len(rest))
         # The truth is on the same grid, so the error of the grid does not count.
-        half = math.hypot(found.scatter, found.model, found.refinement)
-        yield abs(found.mean - rest.mean()) <= math.hypot(half, error_of_truth), half, rest.std(ddof=1)
+        half = math.hypot(found.relative.scatter, found.relative.model, found.relative.refinement)
+        yield abs(rest.mean()) <= math.hypot(half, error_of_truth), half, rest.std(ddof=1)
 
 
 def tables():
@@ -187,9 +187,9 @@ def _costs(values, seconds):
         *_, grid, ratio, quantity, pressure = case
         if grid != LARGE_GRID or quantity == "stiffness":
             continue
-        found = estimate_mean(levels["asperities"], levels["coarse"], levels["fine"])
+        found = estimate_quantity(levels["asperities"], levels["coarse"], levels["fine"]).relative
         half = math.hypot(found.scatter, found.model, found.refinement)
-        scatter = np.std(list(levels["coarse"].values()), ddof=1)
+        scatter = np.std(np.log(list(levels["coarse"].values())), ddof=1)
         plain = next(n for n in range(2, 10**6) if students_t.ppf(0.95, n - 1) * scatter / math.sqrt(n) <= half)
         spent = sum(count * np.mean(seconds[case][level]) for level, count in LARGE_PLAN.items())
         times = [f"{np.mean(seconds[case][level]):.1f} s" for level in LARGE_PLAN]

@@ -30,6 +30,10 @@ _LEVELS = {
 _STOPS = {"reduced_pressure": "p*", "relative_load": "p/E*", "area_fraction": "A/A0"}
 
 
+# If the half-width divided by the value is larger, the interval need not be symmetric, and its ends are printed.
+_WIDE = 0.3
+
+
 class Answer(NamedTuple):
     """One estimate.
 
@@ -38,9 +42,10 @@ class Answer(NamedTuple):
     contact : text with surface, rms slope and material.
     state : text with the target of the state; empty for a quantity of a loop.
     quantity : name of the quantity in words.
-    value, half_width : estimate and half-width of its interval in `unit`.
+    value, low, high : estimate and ends of its interval in `unit`.
     unit : unit; "" for counts.
     shares : half-width in `unit` by cause: seeds, model, grid, inputs.
+    note : text about seeds with full contact; empty if there are none.
     limit : sentence that names what limits the accuracy.
     """
 
@@ -48,18 +53,28 @@ class Answer(NamedTuple):
     state: str
     quantity: str
     value: float
-    half_width: float
+    low: float
+    high: float
     unit: str
     shares: dict[str, float]
+    note: str
     limit: str
 
     @property
+    def half_width(self) -> float:
+        """Half-width of the interval."""
+        return (self.high - self.low) / 2
+
+    @property
     def number(self) -> str:
-        """Estimate with interval, and the contributions to the interval, as text."""
+        """Estimate with interval, and the contributions to the interval, as text; a wide interval as its two ends."""
         digits = max(0, 1 - math.floor(math.log10(self.half_width))) if self.half_width > 0 else 3
         unit = f" {self.unit}" if self.unit else ""
         parts = ", ".join(f"{name} {part:.2g}" for name, part in self.shares.items())
-        return f"{self.value:.{digits}f}{unit} ± {self.half_width:.{digits}f}{unit} ({parts})"
+        interval = f" ± {self.half_width:.{digits}f}{unit}"
+        if self.half_width > _WIDE * self.value:
+            interval = f", from {self.low:.{digits}f} to {self.high:.{digits}f}{unit}"
+        return f"{self.value:.{digits}f}{unit}{interval} ({parts}){self.note}"
 
 
 def answers_of(study: xr.Dataset) -> list[Answer]:
@@ -77,16 +92,19 @@ def _answer(row: xr.Dataset) -> Answer:
         causes["grid"] = math.hypot(known["refinement"], known["grid"])
     if not math.isnan(shares["inputs"]):
         causes["inputs"] = known["inputs"]
-    half = float(row["estimate_high"] - row["estimate_low"]) / 2
     kind = str(row["stop_kind"].item())
     return Answer(
         f"{row['material'].item()} on {row['surface'].item()}, h'rms = {float(row['rms_slope']):.4g}",
         "" if kind == LOOP else state_words(kind, float(row["stop_target"])),
         WORDS[quantity],
         value * factor,
-        half * factor,
+        float(row["estimate_low"]) * factor,
+        float(row["estimate_high"]) * factor,
         unit,
         {name: share * value * factor for name, share in causes.items()},
+        f"; full contact in {int(row['full_contact_seeds'])} of {int(row['fine_seeds'])} seeds"
+        if row["full_contact_seeds"]
+        else "",
         _limit(row, shares),
     )
 

@@ -1,14 +1,16 @@
 """Estimate a mean over random surfaces from three levels of nested seeds, with an interval.
 
 The levels are, from cheap to accurate: asperities (A), boundary elements on half the grid (C, coarse), and boundary
-elements on the grid (F, fine). Each level contains the seeds of the next level. All values are logarithms. The estimate
-is that of multilevel control variates,
+elements on the grid (F, fine). Each level contains the seeds of the next level. The estimate is that of multilevel
+control variates,
 
     E = mean_F(F - C) + mean_C(C - b A) + b mean_A(A),
 
 where the index of a mean names the seeds of the mean. The coefficient b is that of the regression of C on A. The first
 term corrects the error of the coarse grid, the second term corrects the error of the asperity model, and the third term
-has the scatter of many seeds.
+has the scatter of many seeds. Values are logarithms if the seeds scatter little, because the errors of the levels are
+relative errors. If the seeds scatter much, or if some values are zero, values are the quantity itself: then the mean of
+logarithms would differ from the mean.
 
 Sources: M. B. Giles, Multilevel Monte Carlo methods, Acta Numerica 24 (2015) 259-328. B. Peherstorfer, K. Willcox &
 M. Gunzburger, Optimal model management for multifidelity Monte Carlo estimation, SIAM J. Sci. Comput. 38 (2016)
@@ -27,16 +29,19 @@ from scipy.stats import t as students_t
 PROBABILITY = 0.9
 # Smallest number of coarse seeds for a fitted coefficient. With fewer seeds, the coefficient is 1.
 ENOUGH_TO_FIT = 5
+# Logarithms are averaged if their standard deviation over the seeds is at most this value. Then their mean differs from
+# the logarithm of the mean by at most half its square, 3 %.
+_MOST_SCATTER = 0.25
 # Order of convergence of contact area and force of boundary elements (docs/short_range.md).
 ORDER = 0.9
 
 
 class Estimate(NamedTuple):
-    """Mean of the logarithm of a quantity, and the half-widths of its interval by cause.
+    """Mean of some values, and the half-widths of its interval by cause.
 
     Attributes
     ----------
-    mean : mean of the logarithm.
+    mean : mean.
     scatter : half-width because the seeds of the cheapest level are few.
     model : half-width because few seeds correct the error of the asperity model; 0 without asperities.
     refinement : half-width because few seeds correct the error of the coarse grid; 0 without coarse seeds.
@@ -55,8 +60,49 @@ class Estimate(NamedTuple):
 
     @property
     def half_width(self) -> float:
-        """Half-width of the interval of the logarithm; an unknown error of the grid does not count."""
+        """Half-width of the interval; an unknown error of the grid does not count."""
         return math.hypot(self.scatter, self.model, self.refinement, 0.0 if math.isnan(self.grid) else self.grid)
+
+
+class QuantityEstimate(NamedTuple):
+    """Mean of a quantity, with its interval.
+
+    Attributes
+    ----------
+    value : mean; the geometric mean if `logarithmic`.
+    relative : estimate of the mean, with half-widths relative to the value.
+    logarithmic : whether logarithms were averaged.
+    """
+
+    value: float
+    relative: Estimate
+    logarithmic: bool
+
+    def interval(self, half_width: float) -> tuple[float, float]:
+        """Return the ends of the interval with a relative half-width; values of one sign keep their sign."""
+        if self.logarithmic:
+            return self.value * math.exp(-half_width), self.value * math.exp(half_width)
+        return self.value * max(0.0, 1 - half_width), self.value * (1 + half_width)
+
+
+def estimate_quantity(
+    asperities: Mapping[int, float], coarse: Mapping[int, float], fine: Mapping[int, float]
+) -> QuantityEstimate | None:
+    """Estimate the mean over seeds of a positive quantity on the fine grid; arguments are those of `estimate_mean`."""
+    levels = asperities, coarse, fine
+    first = np.array(list((asperities or coarse or fine).values()))
+    every = [value for level in levels for value in level.values()]
+    if every and min(every) > 0 and np.std(np.log(first), ddof=min(1, len(first) - 1)) <= _MOST_SCATTER:
+        logarithms = ({seed: math.log(value) for seed, value in level.items()} for level in levels)
+        found = estimate_mean(*logarithms)
+        return found and QuantityEstimate(math.exp(found.mean), found, True)
+    found = estimate_mean(*levels)
+    if found is None:
+        return None
+    size = abs(found.mean) or 1.0
+    widths = ("scatter", "model", "refinement", "grid")
+    relative = found._replace(**{name: getattr(found, name) / size for name in widths})
+    return QuantityEstimate(found.mean, relative, False)
 
 
 class _Term(NamedTuple):
@@ -74,7 +120,7 @@ def estimate_mean(
 
     Parameters
     ----------
-    asperities, coarse, fine : value (a logarithm) of each seed, by seed; levels may be empty. Only seeds that the next
+    asperities, coarse, fine : value of each seed, by seed; levels may be empty. Only seeds that the next
         cheaper level also has are used, unless that level is empty.
 
     Returns

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 import xarray as xr
 
-from icha.analysis.control_variates import PROBABILITY, estimate_mean
+from icha.analysis.control_variates import PROBABILITY, estimate_quantity
 from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
 from icha.datasets.attributes import DERIVED, combine_attributes
 from icha.datasets.build import build_dataset, stack_rows
@@ -71,13 +71,17 @@ def _answers(
         if (kind == LOOP) != (quantity in ESTIMATED_OF_LOOPS) or prescribed or quantity not in study:
             continue
         values = {level: values_of(data, model, quantity, kind, target) for level, (data, model) in levels.items()}
+        areas = values_of(study, REFERENCE_MODEL, "contact_area_fraction", kind, target) if kind != LOOP else None
         for surface, slope, material in itertools.product(*(range(study.sizes[dim]) for dim in CONTACT)):
             by_seed = {level: _by_seed(of_level, surface, slope, material) for level, of_level in values.items()}
-            found = estimate_mean(by_seed["asperities"], by_seed["coarse"], by_seed["fine"])
-            if found is None:
+            if any(math.isinf(value) for level in by_seed.values() for value in level.values()):
+                continue  # the stiffness of full contact
+            mean = estimate_quantity(by_seed["asperities"], by_seed["coarse"], by_seed["fine"])
+            if mean is None:
                 continue
+            found = mean.relative
             share_inputs = _scatter_of_inputs(inputs, quantity, kind, target)
-            half_width = math.hypot(found.half_width, 0.0 if math.isnan(share_inputs) else share_inputs)
+            low, high = mean.interval(math.hypot(found.half_width, 0.0 if math.isnan(share_inputs) else share_inputs))
             yield {
                 "quantity": quantity,
                 "units": study[quantity].attrs["units"],
@@ -86,9 +90,9 @@ def _answers(
                 "material": str(study["material"].values[material]),
                 "stop_kind": kind,
                 "stop_target": target,
-                "estimate": math.exp(found.mean),
-                "estimate_low": math.exp(found.mean - half_width),
-                "estimate_high": math.exp(found.mean + half_width),
+                "estimate": mean.value,
+                "estimate_low": low,
+                "estimate_high": min(high, 1.0) if quantity == "contact_area_fraction" else high,
                 "share_seeds": found.scatter,
                 "share_model": found.model,
                 "share_refinement": found.refinement,
@@ -96,9 +100,11 @@ def _answers(
                 "share_inputs": share_inputs,
                 "asperity_coefficient": found.coefficient,
                 "degrees_of_freedom": found.freedom,
+                "geometric": int(mean.logarithmic),
                 "asperity_seeds": len(by_seed["asperities"]),
                 "coarse_seeds": len(by_seed["coarse"]),
                 "fine_seeds": len(by_seed["fine"]),
+                "full_contact_seeds": sum(area == 1 for area in _by_seed(areas, surface, slope, material).values()),
             }
 
 
@@ -106,7 +112,7 @@ def _scatter_of_inputs(inputs, quantity, kind, target):
     """Return half the width of the interval that 90 % of the sampled cases are in, in the logarithm of a quantity."""
     if inputs is None:
         return math.nan
-    values = np.abs(values_of(inputs, inputs["model"].values[0], quantity, kind, target)[0].astype(float))
+    values = values_of(inputs, inputs["model"].values[0], quantity, kind, target)[0].astype(float)
     logarithms = np.log(values[np.isfinite(values) & (values > 0)])
     # With fewer cases, the quantiles would depend on one case alone.
     if len(logarithms) < 1 / (1 - PROBABILITY):
@@ -134,15 +140,15 @@ def values_of(data, model, quantity, kind, target):
     if kind != LOOP:
         same = np.isclose(runs["step_target"], target, rtol=1e-9, atol=0)
         values = values.where(loading_stops(runs) & (runs["step_kind"] == kind) & same).max("step")
+    if quantity == "pull_off_pressure":
+        values = -values  # tension
     return values.where(usable).transpose("seed", *CONTACT).values, data["seed"].values.tolist()
 
 
 def _by_seed(of_level, surface, slope, material):
-    """Return the logarithms of the positive values of a contact by seed."""
+    """Return the values of a contact by seed, without seeds that have no result."""
     if of_level is None:
         return {}
     values, seeds = of_level
     column = values[:, surface, slope, material].astype(float)
-    # Pull-off pressures are negative.
-    known = np.isfinite(column) & (column != 0)
-    return {seed: math.log(abs(value)) for seed, value, each in zip(seeds, column, known, strict=True) if each}
+    return {seed: float(value) for seed, value in zip(seeds, column, strict=True) if not math.isnan(value)}

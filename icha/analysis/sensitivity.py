@@ -108,7 +108,7 @@ def _responses(models, kinds, results, points, distributions, nodes) -> Iterator
         for target in targets:
             if target >= 0 and kinds[target] in ESTIMATED_AT_TARGETS[quantity]:
                 continue  # prescribed
-            column = np.abs(values[m] if target < 0 else values[m, ..., target])
+            column = values[m] if target < 0 else values[m, ..., target]
             # The logarithm of zero contact area, for example, is not finite.
             known = (np.isfinite(column) & (column > 0)).all(axis=0)
             if not known.any():

@@ -34,6 +34,8 @@ VALIDATION = {
 _VALIDATED = "on seven self-affine surfaces, p* from 0.001 to 0.1 (page on validation)"
 
 _RATIO = "full_contact_energy_ratio"
+# Smallest distance between cells for which a recommendation makes sense, m.
+_ATOM = 1e-10
 # Keys of `Case.facts` that may be missing. The first four are in Pa: pressure for complete contact, strength of the
 # interface, strength without flaws, and largest tension that the grid resolves. The other three are in m: size of the
 # grid cells, rms height, and largest rms height of a sticky surface in the bearing area model.
@@ -194,10 +196,9 @@ def _unresolved_strength(facts):
     if not 0 < facts.get(RESOLVED, math.inf) < facts[STRENGTH]:
         return ""
     needed = facts[SPACING] * (facts[RESOLVED] / facts[STRENGTH]) ** 2
-    return (
-        f"; at the edge of contact the grid resolves tensions up to {format_quantity(facts[RESOLVED], 'Pa')}; cells of "
-        f"{format_quantity(needed, 'm')} would resolve the strength"
-    )
+    cells = f"cells of {format_quantity(needed, 'm')} would resolve" if needed > _ATOM else "no practical grid resolves"
+    resolved = format_quantity(facts[RESOLVED], "Pa")
+    return f"; at the edge of contact the grid resolves tensions up to {resolved}; {cells} the strength"
 
 
 def _resolution(cases):

@@ -37,7 +37,7 @@ def gaussian_complete_pressure(waves: float) -> float:
 def expected_behaviour(energy_ratio: float) -> str:
     """Return a text that describes how a surface with this ratio U_full/dgamma behaves."""
     if energy_ratio < FULL_CONTACT_BELOW:
-        return "sticky: closes by itself, and the strength of the interface decides the pull-off"
+        return "sticky: adhesion closes most of the contact, and the strength of the interface decides the pull-off"
     if energy_ratio < HIGH_PULL_OFF_BELOW:
         return "nearly sticky: high pull-off is expected"
     return "closes under load only"

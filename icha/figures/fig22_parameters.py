@@ -59,7 +59,7 @@ def figure(
         raise NothingToDraw(f"study {study}: no case has a result for {WORDS[quantity]}")
     row = shown.isel(response=0)
     number = int(row["response_target"])
-    values = np.abs(data[quantity].sel(model=best_model(data["model"].values.tolist())))
+    values = data[quantity].sel(model=best_model(data["model"].values.tolist()))
     values = np.exp(np.log((values if number < 0 else values.isel(target=number)).where(lambda v: v > 0)).mean("seed"))
     factor, unit = unit_words(quantity, float(row["middle"]), data[quantity].attrs["units"])
     results = values.values * factor

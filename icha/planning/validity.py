@@ -124,7 +124,7 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
         }
         section = campaign.surfaces[case.surface]
         if isinstance(section, SelfAffineSurface):
-            known[RMS_HEIGHT] = case.rms_slope * facts[RMS_HEIGHT]
+            known[RMS_HEIGHT] = case.rms_slope * section.rms_height_at_unit_slope
             known[STICKY_HEIGHT] = sticky_rms_height(section.rolloff_wavelength, material)
         if MODELS[case.model].by_cells:
             spacing = campaign.period(case.surface) / campaign.grid(case.surface)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from icha.analysis import control_variates
 from icha.analysis.answers import answers_of, as_csv, as_latex, paragraph
 from icha.analysis.estimates import estimate_campaign
 from icha.datasets.campaign import campaign_tree
@@ -26,7 +27,10 @@ def levels():
 
 @pytest.fixture(scope="module")
 def answers():
-    return estimate_campaign(levels())
+    """Return answers with geometric means, although three seeds of this campaign scatter by more than 0.25."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(control_variates, "_MOST_SCATTER", 1.0)
+        return estimate_campaign(levels())
 
 
 def test_estimates_have_the_mean_of_all_seeds_and_the_level_of_the_fine_grid(answers):
@@ -50,6 +54,45 @@ def test_estimates_have_the_mean_of_all_seeds_and_the_level_of_the_fine_grid(ans
     )
     assert here[["asperity_seeds", "coarse_seeds", "fine_seeds"]].to_array().values.T.tolist() == [[3, 3, 2]] * 2
     assert "nominal_pressure" not in study["quantity"].values  # the targets prescribe it
+
+
+def test_seeds_that_scatter_much_have_arithmetic_means():
+    study = estimate_campaign(levels())["one"].to_dataset()
+    row = study.isel(answer=((study["quantity"] == "contact_area_fraction") & (study["material"] == "soft")).values)
+    row = row.isel(answer=0)
+    assert not row["geometric"]
+    areas = np.array(
+        [float(run["contact_area_fraction"][0]) for labels, run in compared.runs().items() if labels.material == "soft"]
+    )
+    # With three coarse seeds, the coefficient is 1.
+    expected = (FINE - COARSE) * areas[:2].mean() + COARSE * areas.mean()
+    assert float(row["estimate"]) == pytest.approx(expected)
+    shares = [float(row[f"share_{name}"]) for name in ("seeds", "model", "refinement", "grid")]
+    assert float(row["estimate_high"] / row["estimate"]) == pytest.approx(1 + math.hypot(*shares))
+    assert float(row["estimate_low"] / row["estimate"]) == pytest.approx(max(0, 1 - math.hypot(*shares)))
+
+
+def test_seeds_with_full_contact_count_and_are_named():
+    """One of three seeds has no gap: the mean contains it, and the infinite stiffness has no estimate."""
+
+    def closed(labels, run):
+        if labels.seed > 1:
+            return run
+        ones = xr.ones_like(run["contact_area_fraction"])
+        return run.assign(contact_area_fraction=ones, mean_gap=0 * ones, contact_stiffness=ones / 0)
+
+    runs = [(labels, closed(labels, run)) for labels, run in compared.patches()]
+    study = estimate_campaign(campaign_tree(runs))["one"].to_dataset()
+    assert "contact_stiffness" not in study["quantity"].values
+    rows = study.isel(answer=((study["quantity"] == "mean_gap") & (study["material"] == "soft")).values)
+    gaps = [float(run["mean_gap"][0]) for labels, run in runs if labels.material == "soft"]
+    assert float(rows["estimate"][0]) == pytest.approx(np.mean(gaps)) and gaps[0] == 0
+    assert rows["full_contact_seeds"].values.tolist() == [1, 1]
+    assert float(rows["estimate_low"].min()) >= 0
+    areas = study["estimate_high"].values[study["quantity"] == "contact_area_fraction"]
+    assert areas.max() <= 1
+    gap = next(each for each in answers_of(study) if each.quantity == "mean gap")
+    assert gap.number.endswith("; full contact in 1 of 3 seeds") and ", from " in gap.number
 
 
 def test_failed_runs_and_those_without_a_model_do_not_count():

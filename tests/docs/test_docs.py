@@ -17,9 +17,11 @@ import own_slopes_campaign as crops
 import pytest
 import xarray as xr
 import yaml
+from sampled_cases import sampled
 
 import icha
 from icha.analysis.estimates import estimate_campaign
+from icha.analysis.sensitivity import sensitivity_of_campaign
 from icha.configuration.campaign import Campaign
 from icha.configuration.cases import run_cases
 from icha.configuration.load import load_configuration
@@ -189,6 +191,9 @@ def with_results(folder):
     (folder / "results/mine/dataset/mine.csv").write_text(table, encoding="utf-8")
     answers = estimate_campaign(compared.tree_of_both())["one"].to_dataset()
     write_dataset(xr.DataTree.from_dict({"/load": answers}), folder / "results/mine/aggregated/answers.nc")
+    runs, samples = sampled("uncertain")
+    sensitivity = sensitivity_of_campaign(campaign_tree(runs), {"uncertain": samples})
+    write_dataset(sensitivity, folder / "results/mine/aggregated/sensitivity.nc")
     write_dataset(crops.tree(), folder / "results/crops/dataset/crops.nc")
     return folder
 

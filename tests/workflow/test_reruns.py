@@ -24,6 +24,7 @@ RUNS_AND_AFTER = {
     "comparison",
     "model_error",
     "answers",
+    "sensitivity",
     "checks",
     "verdict",
     "figure",
@@ -107,7 +108,7 @@ def test_a_new_statement_runs_the_jobs_that_use_its_module(path, rules, some, ow
     [
         ({"name: ICHA developers": "name: A team"},
          {"configuration": 1, "campaign_dataset": 1, "report_page": 1}, {"surface", "run", *BESIDE_RUNS}),
-        ({"license: CC-BY-4.0": "license: CC0-1.0"}, {"run": 19, "surface": 3, "campaign_dataset": 1}, set()),
+        ({"license: CC-BY-4.0": "license: CC0-1.0"}, {"run": 27, "surface": 3, "campaign_dataset": 1}, set()),
         ({"25 MPa": "25000 kPa", "fig1_jkr: {}": "fig1_jkr: {tabor_parameter: 4}"},
          {"configuration": 1, "figure": 1, "report_page": 1}, {"run", "surface"}),
         # The references contain curves of Fuller & Tabor for each material.

@@ -68,7 +68,7 @@ def test_all_promised_files_exist(smoke):
 def test_the_dataset_states_its_origin(smoke):
     campaign = load_configuration(smoke / "results/smoke/config.used.yaml").campaign
     with xr.open_datatree(smoke / "results/smoke/dataset/smoke.nc") as tree:
-        assert set(tree.children) == {"challenge", "multi_slope", "multi_slope_truth", "pull", "pull_far"}
+        assert set(tree.children) == {"challenge", "multi_slope", "multi_slope_truth", "pull", "pull_far", "uncertain"}
         assert tree["multi_slope_truth"]["model"].values.tolist() == ["boundary_elements"]
         assert tree["challenge"]["model"].values.tolist() == ["asperities", "boundary_elements"]
         assert not tree["challenge"]["status"].values.any()
