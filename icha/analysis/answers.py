@@ -70,7 +70,7 @@ class Answer(NamedTuple):
         """Estimate with interval, and the contributions to the interval, as text; a wide interval as its two ends."""
         digits = max(0, 1 - math.floor(math.log10(self.half_width))) if self.half_width > 0 else 3
         unit = f" {self.unit}" if self.unit else ""
-        parts = ", ".join(f"{name} {part:.2g}" for name, part in self.shares.items())
+        parts = ", ".join(f"{name} {float(f'{part:.2g}'):g}" for name, part in self.shares.items())
         interval = f" ± {self.half_width:.{digits}f}{unit}"
         if self.half_width > _WIDE * self.value:
             interval = f", from {self.low:.{digits}f} to {self.high:.{digits}f}{unit}"
@@ -87,9 +87,11 @@ def _answer(row: xr.Dataset) -> Answer:
     factor, unit = unit_words(quantity, value, str(row["units"].item()))
     shares = {name: float(row[f"share_{name}"]) for name in ("seeds", "model", "refinement", "grid", "inputs")}
     known = {name: 0.0 if math.isnan(share) else share for name, share in shares.items()}
-    causes = {"seeds": known["seeds"], "model": known["model"]}
+    causes = {"seeds": math.hypot(known["seeds"], known["refinement"])}
+    if row["asperity_seeds"]:
+        causes["model"] = known["model"]
     if not math.isnan(shares["grid"]):
-        causes["grid"] = math.hypot(known["refinement"], known["grid"])
+        causes["grid"] = known["grid"]
     if not math.isnan(shares["inputs"]):
         causes["inputs"] = known["inputs"]
     kind = str(row["stop_kind"].item())

@@ -4,7 +4,7 @@ import itertools
 import os
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -22,6 +22,7 @@ from icha.configuration.plausibility import (
     unusual_topography,
     unusual_values,
 )
+from icha.configuration.studies import PILOT, Study
 from icha.configuration.topographies import inspect_topographies
 from icha.configuration.yaml_files import (
     apply_defaults,
@@ -32,7 +33,7 @@ from icha.configuration.yaml_files import (
     read_yaml,
 )
 from icha.datasets.results import CHOSEN_LEVELS
-from icha.support.values import NAME_PATTERN, Problem
+from icha.support.values import NAME_PATTERN, NOTHING, Problem
 
 
 @dataclass(frozen=True)
@@ -81,7 +82,11 @@ def load_configuration(
     written = merge(read_yaml(path), overrides or {})
     if results is not None:
         written = _with_chosen_levels(written, Path(results))
-    origin = f"{path} with --config" if overrides else str(path)
+    return _load(path, f"{path} with --config" if overrides else str(path), written, within)
+
+
+def _load(path: Path, origin: str, written: Mapping, within: str | os.PathLike | None) -> Configuration:
+    """Check a configuration and the files that it names."""
     campaign, unusual = _check_text(path, origin, written), unusual_values(written)
     text, confirmed = dump_yaml(written, origin), written.get(CONFIRMED)
     refuse(origin, _files_outside(campaign, within) if within is not None else ())
@@ -93,6 +98,17 @@ def load_configuration(
         unusual += unusual_topography(location, campaign.surfaces[name], each.period, each.rms_slope)
     unusual += unusual_heights(campaign)
     sticky = list(sticky_runs(campaign))
+    if too_sticky := [each for each in sticky if _chooses_levels(campaign.studies[each.location[1]])]:
+        levels = {each.location[1]: {"levels": _WITHOUT_ASPERITIES} for each in too_sticky}
+        found = _load(path, origin, merge(written, {"studies": levels}), within)
+        reason = "is not reached with the asperity model, because {}; boundary elements alone give the estimate"
+        notes = [
+            format_problem(
+                origin, (*each.location[:2], "accuracy"), NOTHING, reason.format(f"{each.value}{each.source}")
+            )
+            for each in too_sticky
+        ]
+        return replace(found, warnings=(*notes, *found.warnings))
     # Other unusual values are reported first, because they may cause the low U_full/dgamma.
     implausible = list(plausibility_problems(unusual, confirmed)) or plausibility_problems(sticky, confirmed)
     unusual += sticky
@@ -102,6 +118,15 @@ def load_configuration(
         format_problem(origin, each.location, each.value, reason.format(each.source, each.usual)) for each in unusual
     ]
     return Configuration(campaign, text, str(path), (*campaign.warnings(), *accepted))
+
+
+def _chooses_levels(study: Study) -> bool:
+    """Return whether ICHA chooses the levels of a study, and has not chosen yet."""
+    return study.accuracy is not None and study.levels is None
+
+
+# Levels of the pilot of a study with `accuracy` whose surfaces are too sticky for the asperity model.
+_WITHOUT_ASPERITIES = {"coarse": f"1..{len(PILOT.coarse)}", "fine": f"1..{len(PILOT.fine)}"}
 
 
 def _with_chosen_levels(written: dict, results: Path) -> dict:

@@ -147,13 +147,12 @@ def unusual_heights(campaign: Campaign) -> Iterator[Unusual]:
                 break
 
 
-_RATIO = Usual(
-    "1",
-    f"{FULL_CONTACT_BELOW:g}",
-    "inf",
+_TOO_STICKY = (
     "for smaller values full contact has a lower energy than separated surfaces, and the asperity model does not "
-    "apply; use a rougher surface, a stiffer material, or `models: [boundary_elements]`",
 )
+_TOO_STICKY += "apply; use a rougher surface, a stiffer material, or "
+_RATIO = Usual("1", f"{FULL_CONTACT_BELOW:g}", "inf", f"{_TOO_STICKY}`models: [boundary_elements]`")
+_RATIO_OF_LEVELS = _RATIO._replace(why=f"{_TOO_STICKY}`levels` without `asperities`")
 
 
 def energy_ratio(campaign: Campaign, contact) -> float:
@@ -182,4 +181,5 @@ def sticky_runs(campaign: Campaign) -> Iterator[Unusual]:
         if ratios[lowest] < FULL_CONTACT_BELOW:
             source = f" for {lowest.material} on {lowest.surface} at rms slope {lowest.rms_slope:.3g}"
             value = f"asperities with U_full/dgamma = {ratios[lowest]:.3g}"
-            yield Unusual(("studies", name, "models"), value, _RATIO, source)
+            key, usual = ("models", _RATIO) if study.levels is None else ("levels", _RATIO_OF_LEVELS)
+            yield Unusual(("studies", name, key), value, usual, source)

@@ -394,7 +394,6 @@ class Study(Section):
         alone, by_summits = self.models == [DEFAULT_MODEL], DEFAULT_MODEL in self.models
         # At a given load, the smallest slope has the largest reduced pressure. Smooth surfaces have the slope 0.
         slope = min((slope for slope in self.rms_slopes if not is_unread(slope) and slope > 0), default=math.inf)
-        most = MAX_REDUCED_PRESSURE if by_summits else LARGEST_REDUCED_PRESSURE
         units = {RELATIVE_LOAD: (slope, ""), NOMINAL_PRESSURE: (pressure_unit, " Pa"), FORCE: (force_unit, " N")}
         largest_radius = side * math.sqrt((MAX_AREA_FRACTION if by_summits else 1.0) / math.pi)
         for location, kind, value in self._states():
@@ -404,11 +403,13 @@ class Study(Section):
             if needed and kind in ASPERITY_RANGES and value > ASPERITY_RANGES[kind].most:
                 reason = f"is out of range; expected {ASPERITY_RANGES[kind].expected}, or models: [boundary_elements]"
                 yield location, value, reason
+            most = MAX_REDUCED_PRESSURE if needed else LARGEST_REDUCED_PRESSURE
             if kind in units and value > most * units[kind][0]:
                 unit, symbol = units[kind]
-                reason = f"is a reduced pressure of {value / unit:g} at rms slope {slope:g}"
                 expected = f"{QUANTITIES[kind].plural.replace('_', ' ')} up to {most * unit:g}{symbol}"
-                yield location, value, f"{reason}; expected {expected}"
+                if needed:
+                    expected += f" (p* = {most:g}, the limit of the asperity model), or models: [boundary_elements]"
+                yield location, value, f"is a reduced pressure of {value / unit:.3g}; expected {expected}"
             if kind == CONTACT_RADIUS and value > largest_radius:
                 limit = f"A/A0 = {MAX_AREA_FRACTION:g}, the limit of the asperity model" if by_summits else "the square"
                 reason = f"is too large on a square of side {side:g} m"

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.contact.models import REFERENCE_MODEL
+from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
 from icha.datasets.labels import LABELS
 from icha.datasets.variables.model_error import FINITE_RANGE
 from icha.support.statistics import ENOUGH
@@ -41,14 +41,17 @@ def caption_of(name: str, contents: Collection[str] | None = None) -> str:
     return _CONDITIONAL.sub(choose, text).strip()
 
 
-def contents_of(campaign: xr.DataTree, studies: Sequence[str], model_error: xr.DataTree | None = None) -> set[str]:
-    """Return the contents of a figure of some studies, as captions name them.
+def contents_of(
+    campaign: xr.DataTree, studies: Sequence[str], model_error: xr.DataTree | None = None, units: str = "reduced"
+) -> set[str]:
+    """Return the contents of a figure of some studies in `units`, as captions name them.
 
-    Contents are `seeds` (several), `few` (2 to 4) and `many` (5 or more) seeds; materials without (`bare`) and with
-    adhesion (`adhesive`); `free` squares; several `surfaces`; `unloading`; boundary elements beside asperities in the
-    limit of a short range (`truth`) and at a `finite` range, also in `loops`.
+    Contents are the units; `asperities`; boundary elements `alone`; `seeds` (several), `few` (2 to 4) and `many` (5 or
+    more) seeds; materials without (`bare`) and with adhesion (`adhesive`); `free` squares; several `surfaces`;
+    `unloading`; boundary elements beside asperities in the limit of a short range (`truth`) and at a `finite` range,
+    also in `loops`.
     """
-    found = set()
+    found = {units}
     shown = [campaign[name].to_dataset() for name in studies if name in campaign.children]
     for study in shown:
         seeds, energy = study.sizes["seed"], study["surface_energy"].values
@@ -64,6 +67,7 @@ def contents_of(campaign: xr.DataTree, studies: Sequence[str], model_error: xr.D
         }
         found |= {name for name, holds in conditions.items() if holds}
     models = {model for study in shown for model in study["model"].values.tolist()}
+    found |= {"asperities"} if DEFAULT_MODEL in models else {"alone"}
     found |= {"truth"} if REFERENCE_MODEL in models and len(models) > 1 else set()
     entries = [] if model_error is None else [node.attrs for node in model_error.children.values()]
     finite = any(entry.get("truth") == FINITE_RANGE and entry.get("study") in studies for entry in entries)

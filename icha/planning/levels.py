@@ -14,6 +14,7 @@ import xarray as xr
 import yaml
 
 from icha.analysis.allocation import LEVELS, allocate, half_width_of_seeds, variances_per_seed
+from icha.analysis.answers import WORDS
 from icha.analysis.estimates import estimate_campaign
 from icha.configuration.campaign import Campaign
 from icha.configuration.studies import Accuracy, Study
@@ -57,7 +58,7 @@ class Choice(NamedTuple):
     def sentence(self) -> str:
         """The accuracy that was reached, beside the required one."""
         reached = f"± {100 * self.half_width:.2g} %" if math.isfinite(self.half_width) else "no interval"
-        return f"{self.quantity} has {reached} ({100 * self.required:.3g} % required)"
+        return f"{WORDS[self.quantity]} {reached} ({100 * self.required:.3g} % required)"
 
 
 def choose_levels(campaign: Campaign, results: Path, cores: int) -> dict[str, Choice]:

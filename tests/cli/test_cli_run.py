@@ -218,6 +218,6 @@ def test_an_accuracy_is_reached_with_seeds_that_stay(tmp_path):
         study = answers["load"].to_dataset()
         area = study.isel(answer=(study["quantity"] == "contact_area_fraction").values)
         reached = float(np.log(area["estimate_high"] / area["estimate"]).max())
-    assert f"contact_area_fraction has ± {100 * reached:.2g} % (20 % required)" in output.splitlines()[-1]
+    assert f"contact area ± {100 * reached:.2g} % (20 % required)" in output.splitlines()[-1]
     assert reached <= 0.2 or "Not reached" in output.splitlines()[-1]
     assert "Nothing to do" in run(project)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from demo_configuration import file_surface, measured_surface
 
+from icha.configuration.cases import run_cases
 from icha.configuration.errors import ConfigurationError
 
 UNUSUAL = {
@@ -86,3 +87,15 @@ def test_sticky_runs_on_surfaces_from_files_are_found_too(load, refused, tmp_pat
     periodic = {"surfaces.rough": file_surface(tmp_path / "heights.npy")}
     load({**periodic, "materials.soft.surface_energy": "0 J/m^2"})
     refused("", {**periodic, "materials.soft.contact_modulus": "1 kPa"}, "studies.one.models: 'asperities with U_full")
+
+
+def test_on_sticky_surfaces_boundary_elements_alone_reach_an_accuracy(load, refused):
+    sticky = {**STICKY, "surfaces.rough.grid": 96, "studies.one.seeds": None}
+    configuration = load(sticky | {"studies.one.accuracy": "5 %"})
+    study = configuration.campaign.studies["one"]
+    assert study.levels.asperities is None and len(study.levels.coarse) == 6 and len(study.levels.fine) == 4
+    assert {case.model for case in run_cases(configuration.campaign)} == {"boundary_elements"}
+    (note,) = (each for each in configuration.warnings if "studies.one.accuracy" in each)
+    assert "U_full/dgamma" in note and "boundary elements alone give the estimate" in note
+    levels = {"asperities": "1..8", "coarse": "1..6", "fine": "1..4"}
+    refused("", sticky | {"studies.one.levels": levels}, "or `levels` without `asperities`")

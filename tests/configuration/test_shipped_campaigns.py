@@ -27,12 +27,16 @@ def test_the_papers_campaign():
     campaign = load_configuration(REPOSITORY / "config/config.yaml").campaign
     assert campaign.name == "paper" and further_software(campaign) == ()
     asperities = [case for case in run_cases(campaign) if case.model == DEFAULT_MODEL]
-    assert len(asperities) == 2 + 9 and surface_cases(campaign) == [("challenge", 1), ("mcghee", 1)]
+    assert len(asperities) == 2 + 9 + 12
+    assert [(name, seed) for name, seed in surface_cases(campaign) if seed == 1][:2] == [
+        ("challenge", 1),
+        ("mcghee", 1),
+    ]
     assert campaign.surfaces["challenge"].cells_per_short_wave == pytest.approx(8)
     ratios = [m.surface_energy / m.contact_modulus for m in campaign.materials.values()][2:]
     assert ratios == pytest.approx([8.333e-9, 4.0e-9, 1.905e-9], rel=1e-3)
     # Boundary elements solve the paper's material, and none, at the same loads with the same snapshots.
-    compared = list(campaign_files(campaign).compared.values())
+    compared = [case for case in campaign_files(campaign).compared.values() if case.study == "challenge"]
     assert {campaign.materials[case.material].surface_energy for case in compared} == {0.05, 0.0}
     for case in compared:
         path = run_settings(campaign, case)["path"]

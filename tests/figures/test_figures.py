@@ -674,6 +674,13 @@ def test_captions_state_only_what_the_figure_contains():
     assert "three arms" not in both and len(caption_of("fig2_area_and_gap")) > len(both)
 
 
+def test_captions_name_the_units_and_the_models_that_are_drawn():
+    alone = campaign_tree(compared.patches())
+    caption = caption_of("fig2_area_and_gap", contents_of(alone, ["one"], units="physical"))
+    assert "mean gap (b), against the nominal pressure" in caption and "Crosses are results of boundary" in caption
+    assert not any(words in caption for words in ("reduced", "asperity model", "GFMD", "Persson"))
+
+
 def test_fig2_in_physical_units_has_pressures_and_gaps_with_units():
     references = reference_dataset(small.SPECTRUM, spectral_moments(small.surface()), {})
     left, right = fig2_area_and_gap.figure(small.tree(), references, study="single", units="physical").axes

@@ -53,7 +53,7 @@ def test_the_cheapest_levels_that_reach_the_accuracy_are_chosen():
 
 def test_a_study_that_is_accurate_enough_needs_no_seeds():
     assert choice("30 %", THREE, TWO).counts == {}
-    assert choice("30 %", THREE, TWO).sentence == "contact_area_fraction has ± 24 % (30 % required)"
+    assert choice("30 %", THREE, TWO).sentence == "contact area ± 24 % (30 % required)"
 
 
 def test_a_budget_on_more_cores_allows_more_seeds():

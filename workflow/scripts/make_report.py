@@ -24,10 +24,10 @@ if "snakemake" in globals():
         linked |= {"Times and memory of the jobs": times} | ({"Error of the model": model_error} if model_error else {})
         campaign, errors = read_campaign(files.campaign), read_campaign(model_error) if model_error else None
         shown = []
-        for (name, studies), png, pdf in zip(
+        for (name, (studies, units)), png, pdf in zip(
             params.figures.items(), files.figures[::2], files.figures[1::2], strict=True
         ):
-            contents = contents_of(campaign, studies, errors) if studies else None
+            contents = contents_of(campaign, studies, errors, units) if studies else None
             shown.append(ReportFigure(name, caption_of(name, contents), png, pdf, tuple(studies)))
         write_report(
             page,
