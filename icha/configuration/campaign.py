@@ -245,8 +245,10 @@ class Campaign(Section):
 
     def _problems(self):
         for label, study in self.studies.items():
-            yield from _within(("studies", label), study.problems(self.snapshots_of(label), *self._units(label)))
             yield from _within(("studies", label), self._model_problems(study))
+            if is_derived_study(label, self.studies):
+                continue  # its problems are those of the study from which it is derived
+            yield from _within(("studies", label), study.problems(self.snapshots_of(label), *self._units(label)))
             yield from _within(("studies", label), self._edge_problems(study))
         sections = {section: getattr(self, section) for section in (*BESIDE_STUDIES, "measurements")}
         for section, entries in (sections | {"figures": self.figures.by_name()}).items():

@@ -23,6 +23,15 @@ _FORMER_KEYS = {
     ("Study", "united_until"): "was removed, because coalesced spots now split when their parts would no longer "
     "overlap. Remove the key",
 }
+# Usual names of keys that have another name here.
+_OTHER_NAMES = {
+    "work_of_adhesion": "surface_energy",
+    "adhesion_energy": "surface_energy",
+    "elastic_modulus": "contact_modulus",
+    "youngs_modulus": "bodies",
+    "roll_off": "rolloff_wavelength",
+    "load": "pressures",
+}
 # Messages for users, by pydantic's type of error. The messages of pydantic itself are for programmers.
 _NOT_A_SECTION = "is not a section; expected a mapping of keys to values"
 _REASONS = {
@@ -30,7 +39,7 @@ _REASONS = {
     "model_attributes_type": _NOT_A_SECTION,
     "bool_type": "is neither true nor false; expected true or false",
     "dict_type": "is not a mapping; expected names with their sections",
-    "list_type": "is not a list; expected a list in brackets, such as [value, value]",
+    "list_type": "is not a list; expected a list in brackets, such as [{}]",
     "string_type": "is not text; expected text (in quotes if the text looks like a number)",
 }
 
@@ -40,11 +49,11 @@ class ConfigurationError(ValueError):
 
 
 def refuse(origin: str, problems: Iterable[Problem], implausible: Iterable[Problem] = ()) -> None:
-    """Raise ConfigurationError if there are problems; the message also lists implausible values as possible causes."""
+    """Raise ConfigurationError if there are problems; the message first lists implausible values as possible causes."""
     found = list(itertools.islice(problems, MOST_PROBLEMS + 1))
     if not found:
         return
-    found += itertools.islice(implausible, MOST_PROBLEMS + 1)
+    found = [*itertools.islice(implausible, MOST_PROBLEMS + 1), *found]
     lines = list(dict.fromkeys(format_problem(origin, *problem) for problem in found))
     if len(lines) > MOST_PROBLEMS:
         lines[MOST_PROBLEMS:] = [f"{origin}: there are more problems; correct these first"]
@@ -79,7 +88,8 @@ def problem_of(details: Mapping) -> Problem:
         return location, value, "is not a valid name; expected lower-case letters, digits, '_' and (not first) '-'"
     # Example of a message of pydantic: "List should have at least 1 item after validation, not 0".
     expected = re.sub(r"^\w+ should (be|have) | after validation.*", "", details["msg"])
-    return location, value, _REASONS.get(kind, f"is not valid; expected {expected}")
+    reason = _REASONS.get(kind, f"is not valid; expected {expected}")
+    return location, value, reason.format("value, value" if isinstance(value, Mapping) else value)
 
 
 def _reason_for_key(kind: str, location: tuple) -> str:
@@ -90,6 +100,7 @@ def _reason_for_key(kind: str, location: tuple) -> str:
     if reason := _FORMER_KEYS.get((section.__name__, name)):
         return reason
     similar = difflib.get_close_matches(str(name), section.model_fields, 1)
+    similar = [each for each in [_OTHER_NAMES.get(name)] if each in section.model_fields] or similar
     hint = f" (did you mean {similar[0]!r}?)" if similar else ""
     return f"unknown key{hint}; expected one of {', '.join(sorted(section.model_fields))}"
 

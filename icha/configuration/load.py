@@ -112,7 +112,7 @@ def _load(path: Path, origin: str, written: Mapping, within: str | os.PathLike |
     # Other unusual values are reported first, because they may cause the low U_full/dgamma.
     implausible = list(plausibility_problems(unusual, confirmed)) or plausibility_problems(sticky, confirmed)
     unusual += sticky
-    refuse(origin, itertools.chain(campaign.problems(), implausible))
+    refuse(origin, itertools.chain(implausible, campaign.problems()))
     reason = "is unusual{}, but confirmed; expected {}"
     accepted = [
         format_problem(origin, each.location, each.value, reason.format(each.source, each.usual)) for each in unusual
@@ -160,7 +160,7 @@ def _check_text(path: Path, origin: str, written: Mapping) -> Campaign:
         refuse(origin, located(map(problem_of, error.errors())), implausible())
     campaign, problems = expand_design(campaign.resolve_paths(path.parent), content)
     refuse(origin, located(problems), implausible())
-    refuse(origin, located(itertools.chain(campaign.problems(), implausible())))
+    refuse(origin, located(itertools.chain(implausible(), campaign.problems())))
     return campaign
 
 

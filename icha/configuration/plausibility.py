@@ -12,6 +12,7 @@ from icha.asperity.full_contact import FULL_CONTACT_BELOW, full_contact_energy_r
 from icha.configuration.campaign import Campaign
 from icha.configuration.surfaces import SelfAffineSurface
 from icha.contact.models import DEFAULT_MODEL
+from icha.datasets.labels import is_derived_study
 from icha.support import formatting
 from icha.support.values import Problem, to_number, to_si
 from icha.surfaces.moments import self_affine_full_contact_energy
@@ -36,7 +37,8 @@ class Usual(NamedTuple):
             number = self._read(value)
         except ValueError:
             return True
-        return (self.or_zero and number == 0) or self._read(self.least) <= number <= self._read(self.most)
+        # Other checks report negative values, and zero where it is not valid.
+        return number <= 0 or self._read(self.least) <= number <= self._read(self.most)
 
     def _read(self, value):
         return to_number(value) if self.si_unit == "1" else to_si(value, self.si_unit)
@@ -138,7 +140,7 @@ def plausibility_problems(
 def unusual_heights(campaign: Campaign) -> Iterator[Unusual]:
     """For each study with rms heights, yield the first height that gives an unusual rms slope."""
     for name, study in campaign.studies.items():
-        if study.rms_heights is None:
+        if study.rms_heights is None or is_derived_study(name, campaign.studies):
             continue
         for contact in campaign.contacts(name):
             if not campaign.surfaces[contact.surface].smooth and not _SLOPE.contains(contact.rms_slope):

@@ -321,5 +321,8 @@ def _require_loads(targets, unloads):
             expected = "expected only loads as targets and turning points"
             raise ValueError(f"control: {LOAD_CONTROL!r} with the target {target.describe()}; {expected}")
     if not unloads:
+        reason = (
+            f"{LOAD_CONTROL!r} without unloading changes nothing, because the path stops where it first reaches a load"
+        )
         expected = f"expected {SEPARATION_CONTROL!r}, or a path that unloads or has turning points"
-        raise ValueError(f"control: {LOAD_CONTROL!r} without unloading; {expected}")
+        raise ValueError(f"control: {reason}; {expected}")
