@@ -124,7 +124,7 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
         }
         section = campaign.surfaces[case.surface]
         if isinstance(section, SelfAffineSurface):
-            # The sum over all waves takes more time than the estimate, but gives exactly the height that a study asks for.
+            # The sum over all waves takes time, but gives exactly the height that the study asks for.
             exact = campaign.studies[case.study].rms_heights is not None
             height = section.rms_height_at_unit_slope if exact else facts[RMS_HEIGHT]
             known[RMS_HEIGHT] = case.rms_slope * height
