@@ -7,6 +7,8 @@ import xarray as xr
 
 from icha.analysis.answers import WORDS, state_words, unit_words
 from icha.contact.models import MODELS
+from icha.support.distributions import KINDS
+from icha.support.formatting import format_quantity
 
 
 def sample_rows(data: xr.Dataset) -> list[dict]:
@@ -34,6 +36,19 @@ def sample_rows(data: xr.Dataset) -> list[dict]:
             }
         )
     return rows
+
+
+def distribution_words(data: xr.Dataset, name: str) -> str:
+    """Describe the distribution of a parameter, such as `hurst: uniform, lower end 0.5, upper end 0.9`."""
+    attributes = data[name].attrs
+    kind, unit = attributes["distribution"], attributes["units"].replace(" m^-2", "/m²")
+    texts = [
+        f"{number:g}" if unit == "1" else format_quantity(number, unit) for number in attributes["distribution_numbers"]
+    ]
+    if kind == "lognormal":
+        texts[1] = f"{attributes['distribution_numbers'][1]:g}"
+    described = ", ".join(f"{words} {text}" for words, text in zip(KINDS[kind], texts, strict=True))
+    return f"{name.replace('_', ' ')}: {kind}, {described}"
 
 
 def sample_table(data: xr.Dataset) -> str:

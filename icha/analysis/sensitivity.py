@@ -66,16 +66,23 @@ def _sensitivity(study, name, cases, parameters):
     )
     described = combine_attributes(f"Sampled cases of study {name}", _SUMMARY, DERIVED, [study.attrs])
     data = build_dataset(SENSITIVITY, values, described | {"study": name})
-    # A sampled rms slope is already among the coordinates.
-    return data.assign_coords(
-        {key: ("case", columns[key], _attributes(key, of)) for key, of in parameters.items() if key != "rms_slope"}
-    )
+    for key, of in parameters.items():
+        # A sampled rms slope is already among the coordinates.
+        column = data["rms_slope"].values if key == "rms_slope" else columns[key]
+        data = data.assign_coords({key: ("case", column, _attributes(key, of))})
+    return data
 
 
 def _attributes(name, of_parameter):
     unit, kind, first, second, _ = of_parameter
-    described = f"{kind}: {KINDS[kind][0]} {first:.9g}, {KINDS[kind][1]} {second:.9g}"
-    return {"units": unit, "long_name": f"sampled {name.replace('_', ' ')}", "distribution": described}
+    numbers = f"{KINDS[kind][0]} and {KINDS[kind][1]}"
+    return {
+        "units": unit,
+        "long_name": f"sampled {name.replace('_', ' ')}",
+        "distribution": kind,
+        "distribution_numbers": np.array([first, second]),
+        "comment": f"distribution_numbers are {numbers}",
+    }
 
 
 def _results(study: xr.Dataset, cases: Sequence[tuple], stops: Sequence[tuple]) -> dict[str, np.ndarray]:

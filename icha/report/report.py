@@ -17,7 +17,7 @@ import xarray as xr
 
 from icha.analysis.answers import answers_of, paragraph
 from icha.analysis.checks import worst
-from icha.analysis.sample_words import sample_rows
+from icha.analysis.sample_words import distribution_words, sample_rows
 from icha.analysis.validity import statements_on_dataset
 from icha.checks.findings import Check
 from icha.contact.models import MODEL_PAPER
@@ -148,11 +148,12 @@ def _answers(name, node):
 def _sample(node):
     """Return the sampled cases of a study for the page: name, number of cases, parameters and rows of a table."""
     data = node.to_dataset()
-    parameters = [f"{name} ({data[name].attrs.get('distribution', '')})" for name in data["parameter"].values]
+    names = data["parameter"].values.tolist()
     return {
         "study": data.attrs["study"],
         "cases": data.sizes["case"],
-        "parameters": parameters,
+        "parameters": [name.replace("_", " ") for name in names],
+        "distributions": [distribution_words(data, name) for name in names],
         "rows": sample_rows(data),
     }
 

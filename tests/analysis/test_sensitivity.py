@@ -8,7 +8,7 @@ import pytest
 from sampled_cases import COUNT, sampled
 
 from icha.analysis.estimates import estimate_campaign
-from icha.analysis.sample_words import sample_rows, sample_table
+from icha.analysis.sample_words import distribution_words, sample_rows, sample_table
 from icha.analysis.sensitivity import sensitivity_of_campaign
 from icha.datasets.campaign import campaign_tree
 from icha.datasets.labels import inputs_study
@@ -29,7 +29,10 @@ def test_results_lie_along_cases_with_the_parameters_as_coordinates(tree):
     ratio = area / expected
     np.testing.assert_allclose(ratio, ratio[0], rtol=1e-12)
     assert data["surface_energy"].attrs["units"] == "J m^-2"
-    assert data["surface_energy"].attrs["distribution"].startswith("lognormal: median 0.05")
+    assert data["surface_energy"].attrs["distribution"] == "lognormal"
+    assert data["surface_energy"].attrs["distribution_numbers"].tolist() == [0.05, 1.3]
+    words = distribution_words(data, "surface_energy")
+    assert words == "surface energy: lognormal, median 50 mJ/m², geometric standard deviation 1.3"
 
 
 def test_indices_are_those_of_the_known_function(tree):
