@@ -107,7 +107,7 @@ def figure(campaign: xr.DataTree, maps: xr.Dataset, *, run: Sequence) -> Figure:
         ax.label_outer()
     for ax in panels.ravel()[len(shown) :]:
         ax.remove()
-    bar = fig.colorbar(image, ax=panels, shrink=0.9, pad=0.015, aspect=28, extend="both")
+    bar = fig.colorbar(image, ax=panels.ravel()[: len(shown)], shrink=0.9, pad=0.015, aspect=28, extend="both")
     bar.set_label(f"pressure ({unit})")
     title = (
         f"{labels.surface}, seed {labels.seed}, {material_label(campaign[labels.study].to_dataset(), labels.material)}"

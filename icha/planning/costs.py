@@ -76,8 +76,8 @@ LAWS = {
     "asperities, adhesion, cycle": PowerLaw(0.14, 0.9, {"spots": 0.9}),
     "boundary_elements": PowerLaw(0.14, 2.6e-7, {"nodes": 1.22, "stops": 0.49}),
     "boundary_elements, adhesion": PowerLaw(0.14, 1.5e-3, {"nodes": 0.35, "stops": 0.55, "spots": 0.71}),
-    "boundary_elements, cycle": PowerLaw(0.14, 6.4e-4, {"nodes": 0.85}),
-    "boundary_elements, adhesion, cycle": PowerLaw(0.14, 0.023, {"nodes": 0.65, "spots": 0.73}),
+    "boundary_elements, cycle": PowerLaw(0.25, 6e-6, {"nodes": 1.25}),
+    "boundary_elements, adhesion, cycle": PowerLaw(0.6, 1.4e-4, {"nodes": 1}),
     "finite range": PowerLaw(0, 7.9e-8, {"nodes": 1.55, "load": 0.3}),
     "finite range, adhesion": PowerLaw(0, 1.2e-8, {"nodes": 1.56, "load": -0.5}),
     "finite range, cycle": PowerLaw(0, 2.8e-7, {"nodes": 1.72, "step": -0.1}),
@@ -150,7 +150,8 @@ class RunSize:
     arrays : number of arrays of the size of the grid that are in memory at the same time.
     summit : memory for each summit, bytes.
     maps : bytes of the compressed maps in the file, for each grid cell and snapshot.
-    sticky : if U_full/dgamma is below this value, the time of a run is proportional to dgamma/U_full.
+    sticky, sticky_cycle : if U_full/dgamma is below this value, the time of a run for loading only, or for a cycle, is
+        proportional to dgamma/U_full.
     minutes : three time limits, min: for loading only, for a cycle, and for a run on several cores.
     """
 
@@ -158,13 +159,15 @@ class RunSize:
     summit: int = 0
     maps: float = 0.0
     sticky: float = 0.0
+    sticky_cycle: float = 0.0
     minutes: tuple[int, int, int] = (30, 120, 240)
 
 
 RUN_SIZES = {
     "asperities": RunSize(arrays=1, summit=9 * 1024),
-    # Measured time, divided by the time at U_full/dgamma = 7: 1.5 at 1.8, 4.3 at 0.72, and up to 21 at 0.14.
-    "boundary_elements": RunSize(arrays=20, maps=1.5, sticky=3.0, minutes=(240, 960, 1440)),
+    # Measured time, divided by the time at U_full/dgamma = 7: 1.5 at 1.8, 4.3 at 0.72, and up to 21 at 0.14. Time of
+    # loops, divided by the time at 100: 2 at 15, 6 at 3.2.
+    "boundary_elements": RunSize(arrays=20, maps=1.5, sticky=3.0, sticky_cycle=20.0, minutes=(240, 960, 1440)),
 }
 
 
@@ -200,7 +203,7 @@ def run_cost(
     law = _law(model, adhesive=adhesive, cycle=bool(legs))
     seconds = law.seconds(nodes=nodes, spots=most, stops=stops)
     size = RUN_SIZES[model]
-    seconds *= max(1.0, size.sticky / energy_ratio)
+    seconds *= max(1.0, (size.sticky_cycle if legs else size.sticky) / energy_ratio)
     steps: float = stops
     if legs:
         # Each contact spot forms and detaches. With adhesion, each jump-in and each jump-off needs several steps.
