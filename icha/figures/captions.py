@@ -49,7 +49,7 @@ def contents_of(
     Contents are the units; `asperities`; boundary elements `alone`; `seeds` (several), `few` (2 to 4) and `many` (5 or
     more) seeds; materials without (`bare`) and with adhesion (`adhesive`); `free` squares; several `surfaces`;
     `unloading`; boundary elements beside asperities in the limit of a short range (`truth`) and at a `finite` range,
-    also in `loops`.
+    also in `loops`; an `estimate` of contact with adhesion from boundary elements without adhesion.
     """
     found = {units}
     shown = [campaign[name].to_dataset() for name in studies if name in campaign.children]
@@ -69,6 +69,7 @@ def contents_of(
     models = {model for study in shown for model in study["model"].values.tolist()}
     found |= {"asperities"} if DEFAULT_MODEL in models else {"alone"}
     found |= {"truth"} if REFERENCE_MODEL in models and len(models) > 1 else set()
+    found |= {"estimate"} if {"bare", "adhesive", "reduced", "truth"} <= found else set()
     entries = [] if model_error is None else [node.attrs for node in model_error.children.values()]
     finite = any(entry.get("truth") == FINITE_RANGE and entry.get("study") in studies for entry in entries)
     return found | ({"finite", "loops"} if finite else set())

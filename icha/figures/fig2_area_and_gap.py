@@ -54,6 +54,7 @@ _LOWER = 0.42
 _SAME_LOAD = 1e-6
 # Ticks of the separation axis, if the ratio of the ends of this axis is less than 60.
 _SEPARATIONS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5)
+_ESTIMATE = {"ls": (0, (6, 1.5, 1, 1.5, 1, 1.5)), "lw": 0.9, "zorder": 1.9}
 # Each entry has two parts: the function that returns the points of a run, and the symbol of the quantity.
 _QUANTITIES = ((curves.area_points, "A"), (curves.gap_points, r"\bar{u}"))
 
@@ -111,9 +112,13 @@ def figure(
         logarithmic_axes(ax, "x")
         ax.axhline(0, color="0.6", lw=0.6, zorder=0)
         ax.set_ylabel(rf"${symbol}/{symbol}_{{\mathrm{{BEM}}}}-1$  (%)")
+    if compared:
+        # Solutions at a finite range are single states, and not runs.
+        runs = [(line, truth) for line, truth in compared if "leg" in next(iter(truth.runs.by_seed.values()))]
+        _draw_estimates(axes[1], shown, runs)
     for ax in axes[-1]:
         ax.set(xlim=x, xlabel=curves.PRESSURE_LABEL)
-    curves.add_legend(fig, [left, right], shown)
+    curves.add_legend(fig, [left, right, *axes[1:].ravel()], shown)
     return fig
 
 
@@ -210,6 +215,48 @@ def _draw_references(left, right, references, limits):
             label="Yang & Persson",
             **black | {"ls": (0, (7, 2))},
         )
+
+
+def _draw_estimates(axes, shown, compared):
+    """Draw the difference between Ciavarella's estimate from boundary elements without adhesion, and those with it."""
+    from icha.analysis import common_loads
+
+    bare = {truth.runs.contact[1:]: truth.runs.by_seed for _, truth in compared if not _energy(truth)}
+    for line, truth in compared:
+        seed = next(iter(truth.stops))
+        without = bare.get(line.runs.contact[1:], {}).get(seed)
+        states = None if without is None or not _energy(truth) else _estimate(without, truth.runs.by_seed[seed])
+        if states is None:
+            continue
+        colour = shown.looks.material_colour(line.runs.labels.material)
+        for ax, (points, _), values in zip(axes, _QUANTITIES, states[1:], strict=True):
+            load, true = points(truth.stops[seed])
+            inside = (states[0] >= load.min()) & (states[0] <= load.max())
+            at = states[0][inside]
+            known = common_loads.interpolate(load, true, at, logarithmic=points is curves.area_points)
+            ax.plot(at, 100 * (values[inside] / known - 1), color=colour, **_ESTIMATE)
+            ax.plot([], [], color=GREY, label="Ciavarella, from runs without adhesion", **_ESTIMATE)
+
+
+def _estimate(bare, adhesive):
+    """Return reduced pressure, area fraction and reduced separation of Ciavarella's estimate; None for few states."""
+    from icha.datasets.campaign import reduced_gap, unit_height
+    from icha.references.bare_runs import ciavarella_states
+
+    loading, height = bare["leg"].values == 0, float(unit_height(bare))
+    loads = (bare["nominal_pressure"] / bare["contact_modulus"]).values[loading]
+    areas, gaps = bare["contact_area_fraction"].values[loading], reduced_gap(bare).values[loading]
+    length = float(adhesive["surface_energy"] / adhesive["contact_modulus"])
+    states = ciavarella_states(loads, areas, gaps * height, length)
+    return states and (
+        states.relative_load / float(bare["unit_slope"]),
+        states.area_fraction,
+        states.separation / height,
+    )
+
+
+def _energy(curve):
+    return float(next(iter(curve.runs.by_seed.values()))["surface_energy"])
 
 
 def _draw_separate_summits(left, right, references, dataset, looks):

@@ -674,11 +674,28 @@ def test_captions_state_only_what_the_figure_contains():
     assert "three arms" not in both and len(caption_of("fig2_area_and_gap")) > len(both)
 
 
+def test_fig2_compares_the_estimate_from_bare_runs_with_adhesive_boundary_elements():
+    pressures = np.geomspace(1e-3, 3e-2, 12).tolist()
+    path = icha.Path(reduced_pressures=pressures, snapshots=[("reduced_pressure", pressures[-1])])
+    runs = {}
+    for material in ("soft", "hertz"):
+        run = icha.simulate(small.surface(1), small.MATERIALS[material], path, seed=1)
+        for model, each in (("asperities", run), ("boundary_elements", compared.own_patches(run))):
+            runs[RunLabels("one", model, "rough", 1, 1.0, material)] = each
+    fig = fig2_area_and_gap.figure(campaign_tree(runs.items()), study="one")
+    names = [text.get_text() for text in fig.legends[0].get_texts()]
+    assert "Ciavarella, from runs without adhesion" in names
+    areas = [line for line in fig.axes[2].get_lines() if line.get_linewidth() == pytest.approx(0.9)]
+    (drawn,) = (line.get_ydata() for line in areas if len(line.get_ydata()))
+    # These boundary elements are the states of asperities. Adhesion alone changes their areas by a fifth.
+    assert len(drawn) > 6 and np.abs(drawn).max() < 8
+
+
 def test_captions_name_the_units_and_the_models_that_are_drawn():
     alone = campaign_tree(compared.patches())
     caption = caption_of("fig2_area_and_gap", contents_of(alone, ["one"], units="physical"))
     assert "mean gap (b), against the nominal pressure" in caption and "Crosses are results of boundary" in caption
-    assert not any(words in caption for words in ("reduced", "asperity model", "GFMD", "Persson"))
+    assert not any(words in caption for words in ("reduced", "asperity model", "GFMD"))
 
 
 def test_fig2_in_physical_units_has_pressures_and_gaps_with_units():
