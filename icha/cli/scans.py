@@ -37,22 +37,21 @@ def describe_scan(name: str, scan, *, to_scale: bool = True, models: Iterable[Mo
     to_scale : whether the units of the heights and of the side lengths are known.
     models : contact models of the runs on the surface; empty if no runs are defined yet.
     """
-    lines = [
-        *_reading(scan),
-        *_defects(scan, to_scale),
-        *_resolution(scan, to_scale, list(models)),
-        *(_noise(scan) if to_scale else ()),
-    ]
+    lines = [*_reading(scan, to_scale), *_defects(scan, to_scale)]
+    if not keys_for_defects(scan):
+        lines += [*_resolution(scan, to_scale, list(models)), *(_noise(scan) if to_scale else ())]
     return (f"{name}: {line}" for line in lines)
 
 
-def _reading(scan) -> Iterator[str]:
+def _reading(scan, to_scale: bool) -> Iterator[str]:
     """Yield lines on the format of the file, on points without a height, and on opposite edges that do not fit."""
     share = formatting.share(scan.filled, scan.points)
     filled = f"heights of {format_count(scan.filled, 'point')} interpolated ({share} of all points)"
     array = f", `data: {printable(scan.data)}`, one of several" if scan.data else ""
     yield f"read as {scan.format}{array}, {filled if scan.filled else 'all points have a height'}"
-    yield scan.reading.partition(", ")[2]
+    points = scan.reading.partition(", ")[2]
+    # Without units, sizes would be assumptions.
+    yield points if to_scale else points.partition(";")[0]
     if scan.filled > MOST_FILLED * scan.points:
         yield (
             f"warning: more than {100 * MOST_FILLED:.0f} % of the heights are interpolated and too smooth; measure "
@@ -66,31 +65,43 @@ def _reading(scan) -> Iterator[str]:
 
 
 def _defects(scan, to_scale: bool) -> Iterator[str]:
-    """Yield lines on outliers, offsets of scan lines, curvature and anisotropy, with the keys that remove them."""
+    """Yield lines on outliers, offsets of scan lines and curvature: what was removed, or the keys that remove them."""
     defects, settings = scan.defects, scan.settings
-    if defects.outliers and settings.outliers == "keep":
-        count, verb = format_count(defects.outliers, "outlier"), "deviates" if defects.outliers == 1 else "deviate"
-        yield (
-            f"warning: {count} {verb} from the points around, the largest by {defects.largest:.3g} rms heights; "
-            "`outliers: remove` replaces outliers"
-        )
+    if defects.outliers:
+        count = format_count(defects.outliers, "outlier")
+        size = f"the largest {defects.largest:.3g} rms heights from the points around"
+        if settings.outliers == "remove":
+            yield f"{count} replaced, {size}"
+        else:
+            yield f"warning: {count}, {size}; `outliers: remove` replaces outliers"
     for levelling, step in defects.offsets.items():
-        if settings.levelling != levelling:
-            size = f" of {formatting.length(float(f'{step:.2g}'))} rms" if to_scale else ""
+        size = f" of {formatting.length(float(f'{step:.2g}'))} rms" if to_scale else ""
+        where = f"the lines along {'x' if levelling == 'lines' else 'y'}"
+        if settings.levelling == levelling:
+            yield f"steps{size} between {where} removed"
+        else:
             yield (
-                f"warning: the lines along {'x' if levelling == 'lines' else 'y'} have steps{size} from line to line, "
-                f"which the surface does not have in the other direction; `levelling: {levelling}` removes them"
+                f"warning: {where} have steps{size} from line to line, which the surface does not have in the other "
+                f"direction; `levelling: {levelling}` removes them"
             )
-    if defects.curvature > MUCH_CURVATURE and settings.detrend == "tilt":
-        yield (
-            f"a paraboloid takes {defects.curvature:.0%} of the variance; if the sample is curved, write "
-            "`detrend: curvature`"
-        )
-    if scan.anisotropy > ANISOTROPIC:
+    if defects.curvature > MUCH_CURVATURE and settings.detrend != "none":
+        taken = f"a paraboloid takes {defects.curvature:.0%} of the variance"
+        advice = "; if the sample is curved, write `detrend: curvature`"
+        yield f"{taken}{' and was removed' if settings.detrend == 'curvature' else advice}"
+    if left := keys_for_defects(scan):
+        yield f"write {' and '.join(left)}; then `icha describe` judges the surface without the defects"
+    elif scan.anisotropy > ANISOTROPIC:
         yield (
             f"anisotropic: the largest rms slope of all directions is {scan.anisotropy:.2g} times the smallest; the "
             "asperity model has been validated for isotropic surfaces only"
         )
+
+
+def keys_for_defects(scan) -> list[str]:
+    """Return the keys that remove outliers and steps between lines, such as `outliers: remove`, if they are not set."""
+    defects, settings = scan.defects, scan.settings
+    found = ["`outliers: remove`"] if defects.outliers and settings.outliers == "keep" else []
+    return found + [f"`levelling: {each}`" for each in defects.offsets if settings.levelling != each]
 
 
 def _resolution(scan, to_scale: bool, models: list[Model]) -> Iterator[str]:
@@ -201,7 +212,12 @@ def read_measured_section(path: Path, data: str | None, folder: Path) -> dict[st
         )
     if gaps:
         lines.append(f"missing: fill                # {gaps} points have no height; with `refuse`, this is an error")
-    advice = {} if missing else format_advice(resolution.advice)
+    lines += [
+        f"# {key.strip('`'):<27}# recommended; see the output of `icha new`" for key in keys_for_defects(resolution)
+    ]
+    advice = {} if missing or keys_for_defects(resolution) else format_advice(resolution.advice)
+    if resolution.defects.curvature > MUCH_CURVATURE:
+        advice["detrend"] = "curvature"
     name = re.sub("[^a-z0-9_-]+", "_", path.stem.lower()).strip("_") or "measured"
     missing["boundary"] = "what surrounds the scan: free, window, mirror or periodic"
     relative = Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()

@@ -295,6 +295,13 @@ class MeasuredSurface(_SurfaceFromFile):
     number)."""
     shape: ShapeSection | None = _SHAPE
 
+    @field_validator("height_unit", "lateral_unit", "size", mode="before")
+    @classmethod
+    def _check_not_empty(cls, value: Any) -> Any:
+        if value is None:
+            raise ValueError("expected a value with its unit; leave the key out if the file contains it")
+        return value
+
     @model_validator(mode="after")
     def _check_boundary(self):
         if self.boundary == "periodic" and self.detrend not in (None, "none"):

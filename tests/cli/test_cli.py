@@ -586,3 +586,15 @@ def test_reasons_of_failures_are_in_logs(progress, tmp_path):
     assert read_error(job, tmp_path) == [] and read_last_line(job, tmp_path) == ""
     (tmp_path / "0.log").write_text("stop 1 of 2\nError: 2 checks failed\nthis one\nthat one\n")
     assert read_error(job, tmp_path) == ["2 checks failed", "this one", "that one"]
+
+
+def test_a_new_campaign_of_a_scan_names_the_key_for_its_defect(project):
+    heights = np.random.default_rng(1).normal(size=(64, 64)).cumsum(axis=0).cumsum(axis=1) * 1e-9
+    heights[5, 7] += 100 * heights.std()
+    np.savetxt("spike.csv", heights, delimiter=",")
+    text = printed("new", "scanned", "--measured", "spike.csv")
+    assert "`outliers: remove`" in text and "pixels of" not in text
+    file = Path("config/campaigns/scanned.yaml")
+    assert "    # outliers: remove " in file.read_text()
+    errors = output("describe", "scanned", status=2)
+    assert all(f"surfaces.spike.{key}: (empty)" in errors for key in ("height_unit", "size", "boundary"))

@@ -90,8 +90,11 @@ def lines(scan):
 
 def test_outliers_are_said_and_replaced_on_request(examined):
     kept, removed = examined(with_spikes()), examined(with_spikes(), outliers="remove")
-    assert "warning: 3 outliers deviate from the points around, the largest by " in lines(kept)
-    assert "outlier" not in lines(removed) and "3 outliers replaced, 0.073 % of the points" in removed.description
+    assert "warning: 3 outliers, the largest " in lines(kept) and "write `outliers: remove`; then" in lines(kept)
+    # With the defect, statements on noise and on a cut-off would be wrong.
+    assert not any(word in lines(kept) for word in ("noise floor", "recommended", "summits"))
+    assert "scan: 3 outliers replaced, the largest " in lines(removed) and "noise floor" in lines(removed)
+    assert "3 outliers replaced, 0.073 % of the points" in removed.description
     elsewhere = np.ones(PLAIN.shape, bool)
     elsewhere[tuple(np.transpose(SPIKES))] = False
     plain = examined(PLAIN).surface.heights
@@ -110,10 +113,11 @@ def test_missing_points_stay_missing_beside_outliers(examined):
 def test_offsets_curvature_and_anisotropy_are_said(examined):
     stepped = examined(PLAIN + OFFSETS)
     assert "the lines along x have steps of" in lines(stepped) and "`levelling: lines` removes them" in lines(stepped)
-    assert "steps" not in lines(examined(PLAIN + OFFSETS, levelling="lines"))
+    levelled = lines(examined(PLAIN + OFFSETS, levelling="lines"))
+    assert "between the lines along x removed" in levelled and "warning" not in levelled
     round_ = examined(SURFACES["cylinder"])
     assert "a paraboloid takes 9" in lines(round_) and "`detrend: curvature`" in lines(round_)
-    assert "paraboloid" not in lines(examined(SURFACES["cylinder"], detrend="curvature"))
+    assert "of the variance and was removed" in lines(examined(SURFACES["cylinder"], detrend="curvature"))
     assert "anisotropic" in lines(examined(PLAIN + 3 * RMS * np.sin(40 * Y)))
     assert not any(word in lines(examined(PLAIN)) for word in ("outlier", "steps from", "paraboloid", "anisotropic"))
 
