@@ -243,7 +243,10 @@ def assert_consistent(contact, state):
     # The sum over the spots alone is split otherwise than that over the sites of the solve.
     assert np.max(np.abs(error), initial=0) <= 2e-7 * contact.rms_height
     first, second, r = all_pairs(spots.position, period)
-    assert np.all(r >= spots.contact_radius[first] + spots.contact_radius[second])
+    # Only the two spots of one split may overlap, until the unloading ends.
+    split = state.sites.split_number[state.contact_radius > 0]
+    together = (split[first] >= 0) & (split[first] == split[second])
+    assert np.all((r >= spots.contact_radius[first] + spots.contact_radius[second]) | together)
     assert np.all(
         np.isin(state.site_of_asperity[state.site_of_asperity >= 0], np.flatnonzero(state.contact_radius > 0))
     )
@@ -277,6 +280,8 @@ def count_rounds(monkeypatch, most):
     return rounds
 
 
+# Here the two spots of a split overlap by 0.8 % of their distance.
+@example(seed=248404, noise=False, adhesion=0.0, tabor=1.0, first=0.203125, moves=[0.46875])
 # Here contacts that break would be made again for ever.
 @example(seed=140, noise=False, adhesion=-0.5, tabor=1.04, first=2.54, moves=[-0.16, -0.43])
 @example(seed=180, noise=True, adhesion=-0.6, tabor=0.5, first=1.5, moves=[0.33, -0.8])
