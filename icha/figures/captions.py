@@ -15,6 +15,7 @@ import numpy as np
 from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
 from icha.datasets.labels import LABELS
 from icha.datasets.variables.model_error import FINITE_RANGE
+from icha.figures.ensembles import MOST_SCATTERED
 from icha.support.statistics import ENOUGH
 
 if TYPE_CHECKING:
@@ -55,9 +56,10 @@ def contents_of(
     shown = [campaign[name].to_dataset() for name in studies if name in campaign.children]
     for study in shown:
         seeds, energy = study.sizes["seed"], study["surface_energy"].values
+        curves = study.sizes["surface"] * study.sizes["rms_slope"] * study.sizes["material"]
         conditions = {
             "seeds": seeds > 1,
-            "few": 1 < seeds < ENOUGH,
+            "few": 1 < seeds < ENOUGH and curves <= MOST_SCATTERED,
             "many": seeds >= ENOUGH,
             "bare": (energy == 0).any(),
             "adhesive": (energy > 0).any(),

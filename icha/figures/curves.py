@@ -218,7 +218,7 @@ def draw_curves(
     drawn = {axes: [] for axes in panels}
     for line in curves.lines:
         for axes, points in panels.items():
-            drawn[axes].append(_draw_line(axes, line, points))
+            drawn[axes].append(_draw_line(axes, line, points, len(curves.lines)))
         if unloading:
             _draw_unloading(panels, line)
     for line in curves.crosses:
@@ -229,7 +229,7 @@ def draw_curves(
     return [tuple(map(np.concatenate, zip(*points, strict=True))) for points in drawn.values()]
 
 
-def _draw_line(axes, line, points):
+def _draw_line(axes, line, points, count):
     """Draw a single run with markers; for several seeds, draw the mean at common loads and the scatter."""
     from icha.analysis.common_loads import at_common_loads
 
@@ -237,7 +237,7 @@ def _draw_line(axes, line, points):
     if len(members) > 1:
         load, values = at_common_loads(members, logarithmic=True)
         if len(load):
-            draw_members(axes, load, values, line.look, positive=True, asked=asked)
+            draw_members(axes, load, values, line.look, positive=True, asked=asked, curves=count)
             return np.tile(load, len(values)), values.ravel()
     # A single run, or several runs without a mean, because these runs have no load in common.
     for load, values in members:

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.container import ErrorbarContainer
     from matplotlib.lines import Line2D
 
+# Largest number of curves whose single seeds are drawn; with more curves, only the means could be told apart.
+MOST_SCATTERED = 8
 # Approximate number of markers on the line of a mean.
 _MEAN_MARKERS = 8
 _SEED_LINE = {"ls": "-", "lw": 0.5, "alpha": 0.5, "zorder": 1.6}
@@ -25,7 +27,16 @@ _SEED_DOT = {"ls": "none", "marker": ".", "ms": 5, "mew": 0, "alpha": 0.5, "zord
 _CROSS = {"ls": "none", "marker": "x", "mew": 0.7, "label": FEWER_SEEDS}
 
 
-def draw_members(axes: Axes, x: np.ndarray, members: np.ndarray, look: dict, *, positive: bool, asked: int = 0) -> None:
+def draw_members(
+    axes: Axes,
+    x: np.ndarray,
+    members: np.ndarray,
+    look: dict,
+    *,
+    positive: bool,
+    asked: int = 0,
+    curves: int = 1,
+) -> None:
     """Draw the mean over the members of an ensemble as a line, with a band or lines that show the scatter.
 
     Parameters
@@ -35,9 +46,10 @@ def draw_members(axes: Axes, x: np.ndarray, members: np.ndarray, look: dict, *, 
     look : arguments of `Axes.plot` for the line.
     positive : True for a logarithmic axis; the confidence band is then positive, and zeros are left out.
     asked : number of requested members; markers of means over fewer members are crossed out.
+    curves : number of curves in the panel; with many curves, few members are not drawn.
     """
     mean, known = ensemble(members).mean, np.isfinite(members)
-    if len(members) > 1:
+    if len(members) > 1 and (len(members) >= ENOUGH or curves <= MOST_SCATTERED):
         _draw_scatter(axes, x, members, look["color"], positive=positive)
     every = max(1, -(-len(x) // _MEAN_MARKERS))
     axes.plot(*_break_lines(known, x, mean), **{"lw": 0.9} | look | {"ls": "-", "markevery": every})
@@ -191,6 +203,9 @@ class Points:
 
 def lines_handles(counts: Iterable[int]) -> dict[str, Line2D]:
     """Return the legend entries of lines that are means over `counts` seeds."""
+    counts = list(counts)
+    if len(counts) > MOST_SCATTERED and max(counts) < ENOUGH:
+        return _handles(counts, {"": {}, "mean over the seeds": {"lw": 0.9}})
     band = {"alpha": 0.35, "lw": 6, "solid_capstyle": "butt"}
     return _handles(counts, {"mean and 95 % band": band, "single seeds beside their mean": _SEED_LINE})
 

@@ -108,7 +108,7 @@ def figure(
             load, members = _difference(line, truth, points)
             if members.size:
                 look, asked = line.look | {"lw": 0.6}, min(line.runs.asked, truth.runs.asked)
-                draw_members(ax, load, members, look, positive=False, asked=asked)
+                draw_members(ax, load, members, look, positive=False, asked=asked, curves=len(compared))
         logarithmic_axes(ax, "x")
         ax.axhline(0, color="0.6", lw=0.6, zorder=0)
         ax.set_ylabel(rf"${symbol}/{symbol}_{{\mathrm{{BEM}}}}-1$  (%)")

@@ -19,6 +19,7 @@ from icha.datasets.files import read_dataset
 from icha.datasets.labels import RunLabels
 from icha.datasets.surface_file import write_surface
 from icha.figures import (
+    ensembles,
     fig1_jkr,
     fig2_area_and_gap,
     fig3_distributions,
@@ -689,6 +690,19 @@ def test_fig2_compares_the_estimate_from_bare_runs_with_adhesive_boundary_elemen
     (drawn,) = (line.get_ydata() for line in areas if len(line.get_ydata()))
     # These boundary elements are the states of asperities. Adhesion changes their areas by 6 to 19 %.
     assert len(drawn) > 6 and np.abs(drawn).max() < 8
+
+
+def test_single_seeds_are_drawn_only_beside_few_curves(monkeypatch):
+    def thin(fig):
+        return [line for line in fig.axes[0].get_lines() if line.get_linewidth() == 0.5 and len(line.get_xdata())]
+
+    tree = compared.tree()
+    fig = fig2_area_and_gap.figure(tree, study="one")
+    assert thin(fig) and "single seeds" in fig.legends[0].get_texts()[-1].get_text()
+    monkeypatch.setattr(ensembles, "MOST_SCATTERED", 1)
+    fig = fig2_area_and_gap.figure(tree, study="one")
+    names = [text.get_text() for text in fig.legends[0].get_texts()]
+    assert not thin(fig) and "mean over the seeds, n = 3" in names
 
 
 def test_captions_name_the_units_and_the_models_that_are_drawn():
