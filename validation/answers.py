@@ -123,7 +123,7 @@ def read_values():
     values, seconds = defaultdict(lambda: defaultdict(dict)), defaultdict(lambda: defaultdict(list))
     for hurst, waves, grid, ratio, level, _, seed, quantity, pressure, value, duration in read_rows():
         case = (hurst, waves, int(grid), ratio, quantity, float(pressure))
-        values[case][level][int(seed)] = abs(float(value))  # pull-off pressures are negative
+        values[case][level][int(seed)] = float(value)
         seconds[case][level].append(float(duration))
     return values, seconds
 

@@ -140,8 +140,6 @@ def values_of(data, model, quantity, kind, target):
     if kind != LOOP:
         same = np.isclose(runs["step_target"], target, rtol=1e-9, atol=0)
         values = values.where(loading_stops(runs) & (runs["step_kind"] == kind) & same).max("step")
-    if quantity == "pull_off_pressure":
-        values = -values  # tension
     return values.where(usable).transpose("seed", *CONTACT).values, data["seed"].values.tolist()
 
 

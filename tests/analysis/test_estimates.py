@@ -5,15 +5,17 @@ import io
 import math
 
 import compared_campaign as compared
+import cyclic_campaign as cyclic
 import numpy as np
 import pytest
+import small_campaign as small
 import xarray as xr
 
 from icha.analysis import control_variates
 from icha.analysis.answers import answers_of, as_csv, as_latex, paragraph
 from icha.analysis.estimates import estimate_campaign
 from icha.datasets.campaign import campaign_tree
-from icha.datasets.labels import coarse_study
+from icha.datasets.labels import RunLabels, coarse_study
 
 COARSE, FINE = 1.3, 1.25
 
@@ -93,6 +95,25 @@ def test_seeds_with_full_contact_count_and_are_named():
     assert areas.max() <= 1
     gap = next(each for each in answers_of(study) if each.quantity == "mean gap")
     assert gap.number.endswith("; full contact in 1 of 3 seeds") and ", from " in gap.number
+
+
+def test_pull_off_and_loss_of_loops_are_positive_means():
+    runs = {seed: cyclic.unloaded(small.run(seed=seed, material="soft")) for seed in (1, 2, 3)}
+    labels = RunLabels("pull", "boundary_elements", "rough", 1, 1.0, "soft")
+    tree = campaign_tree(
+        [
+            (labels._replace(seed=seed), run.assign(resolved_tension=1.0).assign_attrs(contact_model=labels.model))
+            for seed, run in runs.items()
+        ]
+    )
+    study = estimate_campaign(tree)["pull"].to_dataset()
+    for name in ("pull_off_pressure", "hysteresis_loss"):
+        row = study.isel(answer=(study["quantity"] == name).values).isel(answer=0)
+        values = [float(run[name]) for run in runs.values()]
+        assert min(values) > 0
+        expected = np.exp(np.mean(np.log(values))) if row["geometric"] else np.mean(values)
+        assert float(row["estimate"]) == pytest.approx(expected)
+        assert 0 <= row["estimate_low"] < row["estimate"] < row["estimate_high"]
 
 
 def test_failed_runs_and_those_without_a_model_do_not_count():
