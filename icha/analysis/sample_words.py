@@ -20,7 +20,7 @@ def sample_rows(data: xr.Dataset) -> list[dict]:
         factor, unit = unit_words(quantity, float(row["middle"]), data[quantity].attrs["units"])
         state = f" at {state_words(*(data[key].values[number] for key in ('stop_kind', 'stop_target')))}"
         model = f", {MODELS[str(row['response_model'].item())].words}" if data.sizes["model"] > 1 else ""
-        low, middle, high = (f"{float(row[name]) * factor:.3g}" for name in ("low", "middle", "high"))
+        low, middle, high = (f"{float(f'{float(row[name]) * factor:.3g}'):g}" for name in ("low", "middle", "high"))
         shares = [
             "" if math.isnan(share) else f"{100 * share:.0f} ± {100 * half:.0f} %"
             for share, half in zip(row["first_order"].values, row["first_order_half_width"].values, strict=True)
