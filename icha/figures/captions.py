@@ -5,21 +5,19 @@ from __future__ import annotations
 import re
 import tomllib
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
-from icha.datasets.labels import LABELS
-from icha.datasets.variables.model_error import FINITE_RANGE
-from icha.figures.ensembles import MOST_SCATTERED
-from icha.support.statistics import ENOUGH
+from icha.datasets.labels import LABELS, slopes_of
+from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
 
 
 @cache
@@ -28,53 +26,44 @@ def _texts() -> dict[str, str]:
     return {name: " ".join(text.split()) for name, text in tomllib.loads(file.read_text(encoding="utf-8")).items()}
 
 
-# A text of a caption that depends on the contents of the figure, such as `[bare: Open shapes are …]`.
-_CONDITIONAL = re.compile(r"\[(\w+): (.*?)\] ?")
+# A text of a caption that depends on what the figure shows, such as `[bare: Open shapes are …]`.
+_CONDITIONAL = re.compile(r"\[([^\]:]+): (.*?)\] ?")
 
 
-def caption_of(name: str, contents: Collection[str] | None = None) -> str:
-    """Return the caption of a figure with these `contents` (`contents_of`); None stands for all contents."""
-    text = _texts()[name].format_map(_texts())
+def caption_of(name: str, shown: str) -> str:
+    """Return the caption of a figure; `shown` are lines that tell what the figure shows, from `texts_of`."""
 
     def choose(found):
-        return f"{found[2]} " if contents is None or found[1] in contents else ""
+        return f"{found[2]} " if re.search(found[1], shown, re.MULTILINE) else ""
 
-    return _CONDITIONAL.sub(choose, text).strip()
+    return _CONDITIONAL.sub(choose, _texts()[name].format_map(_texts())).strip()
 
 
-def contents_of(
-    campaign: xr.DataTree, studies: Sequence[str], model_error: xr.DataTree | None = None, units: str = "reduced"
-) -> set[str]:
-    """Return the contents of a figure of some studies in `units`, as captions name them.
+def texts_of(figure: Figure, data: Mapping[str, object], studies: Sequence[str]) -> str:
+    """Return all texts of a figure, and words for what no text of a figure tells, as lines.
 
-    Contents are the units; `asperities`; boundary elements `alone`; `seeds` (several), `few` (2 to 4) and `many` (5 or
-    more) seeds; materials without (`bare`) and with adhesion (`adhesive`); `free` squares; several `surfaces`;
-    `unloading`; boundary elements beside asperities in the limit of a short range (`truth`) and at a `finite` range,
-    also in `loops`; an `estimate` of contact with adhesion from boundary elements without adhesion.
+    Words are the names of the `data`; `inset`; and words for the `studies` that are shown: `bare` and `adhesive`
+    materials, `several surfaces`, `several slopes`, `periodic` surfaces, and boundary elements that the model was
+    compared with, `in the limit` or `at finite range`.
     """
-    found = {units}
-    shown = [campaign[name].to_dataset() for name in studies if name in campaign.children]
-    for study in shown:
-        seeds, energy = study.sizes["seed"], study["surface_energy"].values
-        curves = study.sizes["surface"] * study.sizes["rms_slope"] * study.sizes["material"]
+    from matplotlib.text import Text
+
+    words = [*data, *(text.get_text() for text in figure.findobj(Text))]
+    words += ["inset"] if any(axes.child_axes for axes in figure.axes) else []
+    campaign = data["campaign"].children if "campaign" in data else {}
+    for study in (campaign[name].to_dataset() for name in studies if name in campaign):
         conditions = {
-            "seeds": seeds > 1,
-            "few": 1 < seeds < ENOUGH and curves <= MOST_SCATTERED,
-            "many": seeds >= ENOUGH,
-            "bare": (energy == 0).any(),
-            "adhesive": (energy > 0).any(),
-            "free": (study["boundary"] == "free").any(),
-            "surfaces": study.sizes["surface"] > 1,
-            "unloading": study["leg"].max() > 0,
+            "bare": (study["surface_energy"] == 0).any(),
+            "adhesive": (study["surface_energy"] > 0).any(),
+            "several surfaces": study.sizes["surface"] > 1,
+            "several slopes": len(slopes_of(study)) > 1,
+            "periodic": (study["boundary"] == "periodic").any(),
         }
-        found |= {name for name, holds in conditions.items() if holds}
-    models = {model for study in shown for model in study["model"].values.tolist()}
-    found |= {"asperities"} if DEFAULT_MODEL in models else {"alone"}
-    found |= {"truth"} if REFERENCE_MODEL in models and len(models) > 1 else set()
-    found |= {"estimate"} if {"bare", "adhesive", "reduced", "truth"} <= found else set()
-    entries = [] if model_error is None else [node.attrs for node in model_error.children.values()]
-    finite = any(entry.get("truth") == FINITE_RANGE and entry.get("study") in studies for entry in entries)
-    return found | ({"finite", "loops"} if finite else set())
+        words += [word for word, holds in conditions.items() if holds]
+    compared = data["model_error"].children.values() if "model_error" in data else ()
+    truths = {node.attrs.get("truth") for node in compared if node.attrs.get("study") in studies}
+    words += ["in the limit"] if SHORT_RANGE in truths else []
+    return "\n".join(words + (["at finite range"] if FINITE_RANGE in truths else []))
 
 
 def count_runs(campaign: xr.DataTree, studies: Sequence[str]) -> str:

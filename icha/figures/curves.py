@@ -151,8 +151,10 @@ def add_snapshot_legend(
     """Add the titles and the legend to a figure of one snapshot of a study."""
     shown, model = lines[0].runs.labels, model_name(dataset)
     several = {shown.surface: dataset.sizes["surface"] > 1, slope_label(shown.rms_slope): len(slopes_of(dataset)) > 1}
-    panels[0].set_title(select.snapshot_label(*lines[-1].members[0]), loc="right")
-    panels[1].set_title(", ".join(words for words, needed in several.items() if needed), loc="right")
+    place = ", ".join(words for words, needed in several.items() if needed)
+    panels[-1].set_title(place, loc="right")
+    state = select.snapshot_label(*lines[-1].members[0])
+    panels[0].set_title(state if len(panels) > 1 else ", ".join(filter(None, (place, state))), loc="right")
     handles = looks.handles(ls="-", marker=MODEL_MARKERS[model])
     handles |= {model: model_handle(model, ls="-", lw=0.8, mfc="white")}
     if any(line.truths for line in lines):
@@ -237,8 +239,8 @@ def _draw_line(axes, line, points, count):
     if len(members) > 1:
         load, values = at_common_loads(members, logarithmic=True)
         if len(load):
-            draw_members(axes, load, values, line.look, positive=True, asked=asked, curves=count)
-            return np.tile(load, len(values)), values.ravel()
+            drawn = draw_members(axes, load, values, line.look, positive=True, asked=asked, curves=count)
+            return np.tile(load, len(drawn)), drawn.ravel()
     # A single run, or several runs without a mean, because these runs have no load in common.
     for load, values in members:
         axes.plot(load, values, **line.look)

@@ -36,8 +36,10 @@ def draw_members(
     positive: bool,
     asked: int = 0,
     curves: int = 1,
-) -> None:
+) -> np.ndarray:
     """Draw the mean over the members of an ensemble as a line, with a band or lines that show the scatter.
+
+    Return the values that are drawn: the members, or only their mean.
 
     Parameters
     ----------
@@ -49,11 +51,13 @@ def draw_members(
     curves : number of curves in the panel; with many curves, few members are not drawn.
     """
     mean, known = ensemble(members).mean, np.isfinite(members)
-    if len(members) > 1 and (len(members) >= ENOUGH or curves <= MOST_SCATTERED):
+    scattered = len(members) > 1 and (len(members) >= ENOUGH or curves <= MOST_SCATTERED)
+    if scattered:
         _draw_scatter(axes, x, members, look["color"], positive=positive)
     every = max(1, -(-len(x) // _MEAN_MARKERS))
     axes.plot(*_break_lines(known, x, mean), **{"lw": 0.9} | look | {"ls": "-", "markevery": every})
     mark_fewer(axes, x, mean, known, look, asked, every)
+    return members if scattered else mean[None]
 
 
 def _break_lines(known, *rows):

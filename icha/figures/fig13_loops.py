@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from icha.contact.models import REFERENCE_MODEL
+from icha.contact.models import MODELS, REFERENCE_MODEL
 from icha.datasets import results
 from icha.datasets.labels import ContactLabels
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
@@ -117,7 +117,8 @@ def figure(
 
     runs = select.select_by_labels(select.select_unloaded_runs(campaign, study), surface=surface, seed=seed)
     others = select.select_runs(campaign, boundary_elements or study, ragged=False, model=REFERENCE_MODEL)
-    truths = [*(run for _, run in others if select.unloading_legs(run)), *loops]
+    shown = {labels for labels, _ in runs}
+    truths = [*(run for labels, run in others if labels not in shown and select.unloading_legs(run)), *loops]
     slopes = sorted({labels.rms_slope for labels, _ in runs}, reverse=True)
     own_rows = len(runs) > _MOST_LOOPS and 1 < len(slopes) < len(runs)
     # Slopes that have their own panels need no markers.
@@ -143,7 +144,7 @@ def figure(
         shown_loops = [loop for loop in drawn if loop.rms_slope in shown]
         for loop in shown_loops:
             for ax, names in ((left, _LOADS), (right, _AREAS)):
-                _draw(ax, loop, names, turn=len(shown) > 1)
+                _draw(ax, loop, names, turn=len(slopes) > 1)
         _enlarge(left, shown_loops)
         left.set_ylabel(pressure.label)
         right.set_ylabel(AREA_LABEL)
@@ -152,8 +153,9 @@ def figure(
     panels[-1, 0].set_xlabel(gap.label)
     panels[-1, 1].set_xlabel(pressure.label)
     labels, _ = runs[0]
-    panels[0, 0].set_title(f"surface {surface_label(campaign, labels.surface)}, seed {labels.seed}", loc="right")
-    legend_below(fig, _handles(looks, drawn, marked=len(rows[0]) > 1))
+    words = MODELS[labels.model].words, surface_label(campaign, labels.surface), f"seed {labels.seed}"
+    panels[0, 0].set_title(", ".join(words), loc="right")
+    legend_below(fig, _handles(looks, drawn, marked=len(rows[0]) > 1), looks.heading())
     return fig
 
 

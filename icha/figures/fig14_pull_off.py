@@ -57,8 +57,10 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
     load_studies = list(dict.fromkeys(load_studies))
     by_slope = select_detached_lines(campaign, [study], along_slopes=True)
     by_load = select_detached_lines(campaign, load_studies)
-    looks = looks_of_studies(campaign, [study, *load_studies], [contact for contact, _ in (*by_slope, *by_load)])
     points = list(itertools.chain(*by_slope.values(), *by_load.values()))
+    if len({point.labels.rms_slope for point in points}) == 1:  # the same markers in both panels
+        by_load = {((*contact[:2], None), applicable): line for (contact, applicable), line in by_load.items()}
+    looks = looks_of_studies(campaign, [study, *load_studies], [contact for contact, _ in (*by_slope, *by_load)])
     factor, unit = choose_unit(max(float(run[_Y]) for point in points for run in point.by_seed.values()), "Pa")
 
     fig, [panels] = new_panels(2.9, columns=2 if by_load else 1, width=TWO_COLUMNS if by_load else ONE_COLUMN)
@@ -82,7 +84,7 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
             logarithmic_axes(panels[1], "x")
             panels[1].set_xlim(loads.min() / 1.6, loads.max() * 1.6)
     name_models(panels[0], points)
-    legend_below(fig, looks.handles(**_LINE) | points_handles(counts))
+    legend_below(fig, looks.handles(**_LINE) | points_handles(counts), looks.heading())
     return fig
 
 

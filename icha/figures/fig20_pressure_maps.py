@@ -11,8 +11,9 @@ from icha.contact.models import REFERENCE_MODEL
 from icha.datasets import results
 from icha.datasets.labels import RunLabels
 from icha.figures.declaration import Campaign, Declaration, Inputs, RunFigure
+from icha.figures.looks import run_label
 from icha.figures.maps import average_blocks
-from icha.figures.style import in_style, material_label, new_panels
+from icha.figures.style import in_style, new_panels
 from icha.support.formatting import choose_unit, format_quantity
 from icha.support.values import Problem
 
@@ -109,10 +110,7 @@ def figure(campaign: xr.DataTree, maps: xr.Dataset, *, run: Sequence) -> Figure:
         ax.remove()
     bar = fig.colorbar(image, ax=panels.ravel()[: len(shown)], shrink=0.9, pad=0.015, aspect=28, extend="both")
     bar.set_label(f"pressure ({unit})")
-    title = (
-        f"{labels.surface}, seed {labels.seed}, {material_label(campaign[labels.study].to_dataset(), labels.material)}"
-    )
-    fig.suptitle(title, fontsize="medium")
+    fig.suptitle(run_label(campaign, labels), fontsize="medium")
     return fig
 
 
@@ -131,5 +129,5 @@ def _name_state(maps, snapshot):
     pull_off = str(maps["snapshot_kind"].values[snapshot]) == "pull_off"
     name = "pull-off" if pull_off else str(maps["branch"].values[step])
     if "force" in maps:
-        return f"{name}, F = {format_quantity(float(f'{float(maps.force[step]):.3g}'), 'N')}"
-    return f"{name}, A/A₀ = {float(maps['contact_area_fraction'][step]):.3g}"
+        return f"{name}, $F$ = {format_quantity(float(f'{float(maps.force[step]):.3g}'), 'N')}"
+    return f"{name}, $A/A_0$ = {float(maps['contact_area_fraction'][step]):.3g}"

@@ -13,7 +13,7 @@ from icha.figures.declaration import Declaration, SnapshotFigure
 from icha.figures.ensembles import draw_members, join_bins
 from icha.figures.looks import MODEL_MARKERS, TRUTH_LINE
 from icha.figures.select import select_snapshots
-from icha.figures.style import BLACK, in_style, logarithmic_axes, new_panels
+from icha.figures.style import BLACK, GREY, in_style, logarithmic_axes, new_panels
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -68,6 +68,8 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
     for truths, colour in tails:
         p, density = singular_tail(truths, 1.05 * lowest)
         right.semilogy(p, density, ls=":", lw=1.1, color=colour, zorder=3)
+        if p.size:
+            right.plot([], [], ls=":", lw=1.1, color=GREY, label="singular tension at the edge")
     load = np.mean([float(state_of(run, at)["reduced_pressure"]) for run, at in lines[-1].members])
     _finish(left, right, (lowest, highest), top, load)
     add_snapshot_legend(fig, [left, right], campaign[study].to_dataset(), lines, looks)

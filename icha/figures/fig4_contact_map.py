@@ -12,10 +12,10 @@ from icha.datasets import results
 from icha.datasets.labels import RunLabels
 from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.declaration import Campaign, Declaration, Inputs, RunFigure, SnapshotFigure
-from icha.figures.looks import NOT_APPLICABLE_ALONE, surface_label
+from icha.figures.looks import NOT_APPLICABLE_ALONE, run_label
 from icha.figures.maps import draw_map, draw_spots, topography_of, wrap_circles
 from icha.figures.select import is_applicable, select_complete_run
-from icha.figures.style import format_number, in_style, legend_handle, material_label, new_panels
+from icha.figures.style import format_number, in_style, legend_handle, new_panels
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -101,8 +101,7 @@ def figure(
         covered = contact_of_spots(data, at, len(beside["contact_map"]))
         _draw_boundary_elements(panels, topography, (corner, width), heights, beside, covered)
     load = rf"$F/(E^{{\ast}}h′_{{\mathrm{{rms}}}}A_0)$ = {format_number(float(state['reduced_pressure']))}"
-    material = material_label(campaign[labels.study].to_dataset(), labels.material)
-    title = f"{surface_label(campaign, labels.surface)}, {material}, {load}"
+    title = f"{run_label(campaign, labels)}, {load}"
     fig.suptitle(title if is_applicable(data) else f"{title}\n{NOT_APPLICABLE_ALONE}", fontsize="medium")
     for ax in panels.ravel():
         topography.label(ax)

@@ -13,7 +13,7 @@ from icha.figures.declaration import Declaration, SnapshotFigure
 from icha.figures.ensembles import draw_members, join_bins
 from icha.figures.looks import MODEL_MARKERS, TRUTH_LINE
 from icha.figures.select import select_snapshots
-from icha.figures.style import GREY, in_style, logarithmic_axes, new_panels
+from icha.figures.style import TWO_COLUMNS, in_style, logarithmic_axes, new_panels
 from icha.support.formatting import choose_unit
 
 if TYPE_CHECKING:
@@ -30,6 +30,8 @@ _LEAST_PATCHES = 10
 _BINS_PER_DECADE = 8
 # Fewest bins for which a density is drawn.
 _FEWEST_BINS = 3
+# Width of the figure without the panel of the density, inches.
+_ALONE = 4.5
 # Largest number of points of a cumulative curve; more points would not be distinguishable.
 _CURVE_POINTS = 300
 
@@ -39,37 +41,29 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
     """Draw numbers of patches by size (means over seeds), for every material on a study's first surface and slope."""
     lines = select_snapshots(campaign, study, kind, target)
     each_look, looks = snapshot_looks(campaign, study, lines)
-    fig, [(left, right)] = new_panels(3.1, sharex=True)
-    period = float(lines[0].members[0][0]["period"])
-    factor, unit = choose_unit(period, "m")
-    cell, most_bins = (period * factor) ** 2, 0
-    for line, look in zip(lines, each_look, strict=True):
-        areas, true_areas = (
-            [patch_areas(run, at) * factor**2 for run, at in members] for members in (line.members, line.truths)
-        )
+    factor, unit = choose_unit(float(lines[0].members[0][0]["period"]), "m")
+    cell = (float(lines[0].members[0][0]["period"]) * factor) ** 2
+    areas = [
+        tuple([patch_areas(run, at) * factor**2 for run, at in members] for members in (line.members, line.truths))
+        for line in lines
+    ]
+    # Without enough patches for a density, the figure has only the second panel.
+    dense = max(len(patch_density(each, cell)[0]) for each, _ in areas) >= _FEWEST_BINS
+    fig, [panels] = new_panels(3.1, columns=1 + dense, width=TWO_COLUMNS if dense else _ALONE, sharex=True)
+    for line, look, (own, true) in zip(lines, each_look, areas, strict=True):
         smooth = look | {"marker": "none", "lw": 1.4 * look["lw"]}
-        for ax, points, line_look, marker in (
-            (left, patch_density, look, MODEL_MARKERS[SHORT_RANGE]),
-            (right, patches_above, smooth, "none"),
-        ):
-            size, values = points(areas, cell)
-            if ax is left:
-                most_bins = max(most_bins, len(size))
-                if len(size) < _FEWEST_BINS:
-                    continue
-            draw_members(ax, size, values, line_look, positive=True, asked=line.runs.asked)
-            if line.truths:
-                area, values = points(true_areas, cell)
+        drawn = [(patch_density, look, MODEL_MARKERS[SHORT_RANGE]), (patches_above, smooth, "none")]
+        for ax, (points, line_look, marker) in zip(panels, drawn[-len(panels) :], strict=True):
+            draw_members(ax, *points(own, cell), line_look, positive=True, asked=line.runs.asked)
+            if true:
+                area, values = points(true, cell)
                 ax.plot(area, values.mean(axis=0), color=look["color"], marker=marker, **TRUTH_LINE)
-    if most_bins < _FEWEST_BINS:
-        left.set_axis_off()
-        left.text(0.5, 0.5, "too few patches for a density", transform=left.transAxes, ha="center", color=GREY)
-    for ax in (left, right):
+    for ax in panels:
         logarithmic_axes(ax)
         ax.set_xlabel(f"patch area  $A$ ({unit}²)")
-    left.set_ylabel(f"number density  $n(A)$ ({unit}$^{{-4}}$)")
-    right.set_ylabel(f"patches larger than $A$ ({unit}$^{{-2}}$)")
-    add_snapshot_legend(fig, [left, right], campaign[study].to_dataset(), lines, looks)
+    panels[0].set_ylabel(f"number density  $n(A)$ ({unit}$^{{-4}}$)")
+    panels[-1].set_ylabel(f"patches larger than $A$ ({unit}$^{{-2}}$)")
+    add_snapshot_legend(fig, panels, campaign[study].to_dataset(), lines, looks)
     return fig
 
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.contact.models import MODELS
+from icha.datasets.labels import RunLabels, slopes_of
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
 from icha.figures.style import BLACK, COLOURS, GREY, INTERFACE, legend_handle, material_label, slope_label
 from icha.support.formatting import format_quantity
@@ -50,8 +51,8 @@ FEW_LINES = 6
 # each material is narrower than the curve of the previous material. Thus coinciding curves are all visible.
 _BARE_SIZE, _ADHESIVE_SIZE, _LEAST_SIZE, _NARROWER = 6.0, 4.6, 1.8, 0.75
 _LINE_WIDTH = 0.22
-# End of the range of graded colours (0 dark, 1 bright); brighter colours are invisible on white.
-_BRIGHTEST = 0.9
+# Colour maps of the first surfaces, if several surfaces have several slopes.
+_HUES = ("Blues_r", "Oranges_r", "Greens_r")
 # Largest number of graded colours that a legend names.
 _MOST_NAMED = 9
 # Fraction of the original colour in a pale colour; the rest is white.
@@ -88,7 +89,10 @@ class Looks:
         coloured = self.places if self.by_place else self.materials
         self.many = len(coloured) > MOST_COLOURS
         graded = self.many or self.by_place
-        palette = graded_colours(len(coloured)) if graded else map(material_colours(campaign).get, coloured)
+        if graded:
+            palette = _place_colours(self.places) if self.by_place else graded_colours(len(coloured))
+        else:
+            palette = map(material_colours(campaign).get, coloured)
         self._colours = dict(zip(coloured, palette, strict=True))
         # The steepest slope of a surface has the first marker.
         surfaces = list(dict.fromkeys(surface for surface, _ in self.places))
@@ -139,9 +143,9 @@ class Looks:
         material, place = self.materials[0], self.places[0]
         if self.by_place:
             found = {self.place_name(each): self.look((material, *each)) | changed for each in some_of(self.places)}
-            shapes = self.materials if len(self.materials) > 1 else []
-            grey = {"color": GREY, "mec": GREY}
-            found |= {self.material_name(each): self.look((each, *place)) | changed | grey for each in some_of(shapes)}
+            for each in [] if self.heading() else some_of(self.materials):
+                look = self.look((each, *place)) | changed | {"color": GREY, "mec": GREY}
+                found[self.material_name(each)] = look | ({"mfc": GREY} if self.adhesive(each) else {})
         else:
             changed = ({"marker": MODEL_MARKERS[ASPERITIES_NAME]} if self.place_name(place) else {}) | changed
             found = {self.material_name(each): self.look((each, *place)) | changed for each in some_of(self.materials)}
@@ -149,6 +153,10 @@ class Looks:
             found |= {self.place_name(each): grey | {"marker": marker} for each, marker in self._markers.items()}
             found.pop("", None)  # the name is empty if the figure has a single surface and slope
         return {name: legend_handle(**look) for name, look in found.items()}
+
+    def heading(self) -> str | None:
+        """Return the heading of a legend: the only material, if colours distinguish surfaces and slopes."""
+        return self.material_name(self.materials[0]) if self.by_place and len(self.materials) == 1 else None
 
     def colour_handles(self) -> dict[str, Line2D]:
         """Return legend entries that show only colours: bars of some materials, or of some surfaces and slopes."""
@@ -211,6 +219,15 @@ def surface_label(campaign: xr.DataTree, surface: str) -> str:
     return surface
 
 
+def run_label(campaign: xr.DataTree, labels: RunLabels) -> str:
+    """Return surface and material of a run, and the seed and the slope if the study has several, as text."""
+    study = campaign[labels.study].to_dataset()
+    words = [surface_label(campaign, labels.surface)]
+    words += [f"seed {labels.seed}"] if study.sizes["seed"] > 1 else []
+    words += [slope_label(labels.rms_slope)] if len(slopes_of(study)) > 1 else []
+    return ", ".join([*words, material_label(study, labels.material)])
+
+
 def _symbol_and_value(name, values, k):
     """Return the symbol of a varied parameter with the value at index `k`, as text."""
     value = values.values[k]
@@ -245,12 +262,22 @@ def _pale(look):
     return look | {"color": colour, "mec": colour, "mfc": "white", "label": NOT_APPLICABLE}
 
 
-def graded_colours(count: int) -> list[str]:
-    """Return `count` colours from dark to bright, as hexadecimal text."""
+def graded_colours(count: int, name: str = "viridis", brightest: float = 0.9) -> list[str]:
+    """Return `count` colours of a colour map from dark (0) to `brightest` (at most 1), as hexadecimal text."""
     import matplotlib as mpl
     from matplotlib.colors import to_hex
 
-    return [to_hex(colour) for colour in mpl.colormaps["viridis"](np.linspace(0, _BRIGHTEST, count))]
+    return [to_hex(colour) for colour in mpl.colormaps[name](np.linspace(0, brightest, count))]
+
+
+def _place_colours(places):
+    """Return graded colours; if few surfaces have several slopes each, every surface has a hue."""
+    surfaces = [surface for surface, _ in places]
+    hues = dict(zip(dict.fromkeys(surfaces), _HUES, strict=False))
+    if len(hues) < max(2, len(set(surfaces))) or len(hues) == len(places):
+        return graded_colours(len(places))
+    colours = {surface: iter(graded_colours(surfaces.count(surface), hue, 0.6)) for surface, hue in hues.items()}
+    return [next(colours[surface]) for surface in surfaces]
 
 
 def some_of(names: Sequence) -> list:
@@ -267,8 +294,8 @@ _MANY_NAMES = 12
 _MOST_COLUMNS = 4
 
 
-def legend_below(figure: Figure, handles: Mapping[str, object]) -> None:
-    """Add a legend below the panels, with an entry for each handle, in as many columns as fit.
+def legend_below(figure: Figure, handles: Mapping[str, object], heading: str | None = None) -> None:
+    """Add a legend below the panels, with an entry for each handle, in as many columns as fit, and with a heading.
 
     The legend increases the height of the figure, and must therefore be added last.
     """
@@ -276,7 +303,7 @@ def legend_below(figure: Figure, handles: Mapping[str, object]) -> None:
     handles = dict(handles) | {name: marks[name] for name in (FEWER_SEEDS, NOT_APPLICABLE) if name in marks}
     look = {"loc": "outside lower center", "fontsize": 8 if len(handles) <= _MANY_NAMES else 7}
     for columns in range(_MOST_COLUMNS if handles else 0, 0, -1):
-        legend = figure.legend(handles.values(), handles.keys(), ncols=columns, **look)
+        legend = figure.legend(handles.values(), handles.keys(), ncols=columns, title=heading, **look)
         size = legend.get_window_extent().size / figure.dpi
         if size[0] < figure.get_figwidth() or columns == 1:
             figure.set_figheight(figure.get_figheight() + size[1])

@@ -12,8 +12,10 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import icha.figures
+from icha.figures.captions import caption_of, texts_of
 from icha.figures.declaration import Declaration
 from icha.figures.style import GREY, in_style, new_figure, save
+from icha.support.atomic_files import whole_file
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -41,23 +43,35 @@ def draw_figure(
     name: str,
     png: str | os.PathLike,
     pdf: str | os.PathLike,
+    text: str | os.PathLike,
     *,
     inputs: Mapping[str, str | Sequence[str]],
     arguments: Mapping[str, Any],
+    studies: Sequence[str] = (),
 ) -> None:
-    """Draw a figure and write it to `png` and `pdf`; if no run in the figure is complete, write a message only.
+    """Draw a figure and write it to `png` and `pdf`, and its caption to the file `text`.
 
-    The `inputs` are paths of files. The `arguments` are keyword arguments of the function `figure`.
+    If no run in the figure is complete, the figure is a message only.
+
+    Parameters
+    ----------
+    inputs : paths of files.
+    arguments : keyword arguments of the function `figure`.
+    studies : names of the studies whose runs the figure shows.
     """
     from icha.figures.select import NothingToDraw
 
     data = {argument: _read(files) for argument, files in inputs.items()}
     try:
         figure = figure_module(name).figure(**data, **arguments)
+        caption = caption_of(name, texts_of(figure, data, studies))
     except NothingToDraw as reason:
-        print(f"Nothing to draw, so the page contains only a message: {reason}")
+        caption = f"Nothing to draw: {reason}."
+        print(caption)
         figure = _empty_page(str(reason))
     save(figure, png, pdf)
+    with whole_file(text) as temporary:
+        temporary.write_text(f"{caption}\n", encoding="utf-8")
 
 
 def _read(files):

@@ -202,7 +202,7 @@ def _derived_files(campaign, files: CampaignFiles, computed: list[Item]) -> Iter
         flat = [path for each in inputs for path in ([each] if isinstance(each, str) else each)]
         cost_of_figure = cost("figure", count, 400e3, values, nodes=nodes, models=models)
         yield "figures", "figure", path, 3, flat, cost_of_figure
-    disk_of_report = 700e3 + 250e3 * len(files.figures) // 2
+    disk_of_report = 700e3 + 250e3 * len(files.figures) // 3
     cost_of_report = cost("report_page", runs, disk_of_report, values)
     yield "report", "report_page", files.report, 4, files.computed, cost_of_report
 

@@ -103,7 +103,7 @@ def campaign_files(campaign: Campaign, folder: str = "") -> CampaignFiles:
         figures=[
             path(results.FIGURE, name=name, ending=ending)
             for name in campaign.figures.by_name()
-            for ending in ("png", "pdf")
+            for ending in ("png", "pdf", "txt")
         ],
         report=path(results.REPORT),
         run_times=path(results.RUN_TIMES),

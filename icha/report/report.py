@@ -39,16 +39,16 @@ class ReportFigure:
     Attributes
     ----------
     name : name of the figure, such as `fig2_area_and_gap`.
-    caption : caption of the figure.
     png : PNG file of the figure, which the page contains.
     pdf : PDF file of the figure, to which the page links.
+    text : text file with the caption.
     studies : names of the studies whose runs the figure shows.
     """
 
     name: str
-    caption: str
     png: str | os.PathLike
     pdf: str | os.PathLike
+    text: str | os.PathLike
     studies: tuple[str, ...] = ()
 
 
@@ -158,6 +158,11 @@ def _sample(node):
     }
 
 
+def _caption(figure, campaign):
+    """Return the caption of a figure, with the numbers of runs that are missing or drawn pale."""
+    return f"{Path(figure.text).read_text(encoding='utf-8')} {count_runs(campaign, figure.studies)}".strip()
+
+
 def _pictures(figures: Sequence[ReportFigure], campaign: xr.DataTree, link) -> list[dict]:
     """Return the figures of the page: first the figures of several studies or of no study, then those of each study.
 
@@ -168,7 +173,7 @@ def _pictures(figures: Sequence[ReportFigure], campaign: xr.DataTree, link) -> l
         {
             "name": figure.name,
             "number": figure_number(figure.name),
-            "caption": " ".join(filter(None, (figure.caption, count_runs(campaign, figure.studies)))),
+            "caption": _caption(figure, campaign),
             "data": base64.b64encode(Path(figure.png).read_bytes()).decode("ascii"),
             "pdf": link(figure.pdf),
             "study": figure.studies[0] if len(figure.studies) == 1 and figure.studies[0] in studies else None,

@@ -32,7 +32,7 @@ from icha.figures import (
     fig10_model_error,
     fig11_distribution_error,
 )
-from icha.figures.captions import caption_of, contents_of
+from icha.figures.captions import caption_of, texts_of
 from icha.figures.looks import material_colours, some_of
 from icha.figures.maps import average_blocks, wrap_circles
 from icha.figures.select import NothingToDraw, branches, path_steps, select_runs
@@ -656,23 +656,27 @@ def test_fig4_does_not_show_another_run_where_its_own_failed(surface):
 
 def test_a_density_of_fewer_than_three_bins_is_not_drawn(monkeypatch):
     monkeypatch.setattr(fig8_patch_sizes, "_FEWEST_BINS", 3)
-    left, right = fig8_patch_sizes.figure(small.tree(), study="single").axes
-    assert not [line for line in left.get_lines() if len(line.get_xdata())] and right.get_lines()
-    assert "too few patches for a density" in [text.get_text() for text in left.texts]
+    (alone,) = fig8_patch_sizes.figure(small.tree(), study="single").axes
+    assert alone.get_lines() and "patches larger" in alone.get_ylabel()
+    assert "seed" not in alone.get_title(loc="right") and "A_0" in alone.get_title(loc="right")
+
+
+def caption_of_fig2(study, **data):
+    units = {"units": data.pop("units")} if "units" in data else {}
+    drawn = fig2_area_and_gap.figure(**data, study=study, **units)
+    return caption_of("fig2_area_and_gap", texts_of(drawn, data, [study]))
 
 
 def test_captions_state_only_what_the_figure_contains():
     tree = small.tree()
-    bare = caption_of("fig2_area_and_gap", contents_of(tree, ["slopes"]))
+    bare = caption_of_fig2("slopes", campaign=tree)
     assert "Open shapes are results without adhesion." in bare and "boundary elements" not in bare
-    assert "Lines are means" not in bare and "Thin dashed" not in bare and "[" not in bare
-    seeds = caption_of("fig2_area_and_gap", contents_of(tree, ["single"]))
+    assert "Lines are means" not in bare and "Thin dashed" not in bare and "theories" not in bare
+    seeds = caption_of_fig2("single", campaign=tree)
     assert "Lines are means over the seeds" in seeds and "Pale thin lines" in seeds and "A band" not in seeds
-    both = caption_of("fig2_area_and_gap", contents_of(compared.tree_of_both(), ["one"]))
-    assert "The lower panels show" in both and "Open shapes" in both
-    errors = compared.errors()
-    assert "three arms" in caption_of("fig2_area_and_gap", contents_of(compared.tree(), ["one"], errors))
-    assert "three arms" not in both and len(caption_of("fig2_area_and_gap")) > len(both)
+    both = caption_of_fig2("one", campaign=compared.tree_of_both())
+    assert "The lower panels show" in both and "Open shapes" in both and "three arms" not in both
+    assert "three arms" in caption_of_fig2("one", campaign=compared.tree(), model_error=compared.errors())
 
 
 def test_fig2_compares_the_estimate_from_bare_runs_with_adhesive_boundary_elements():
@@ -707,7 +711,7 @@ def test_single_seeds_are_drawn_only_beside_few_curves(monkeypatch):
 
 def test_captions_name_the_units_and_the_models_that_are_drawn():
     alone = campaign_tree(compared.patches())
-    caption = caption_of("fig2_area_and_gap", contents_of(alone, ["one"], units="physical"))
+    caption = caption_of_fig2("one", campaign=alone, units="physical")
     assert "mean gap (b), against the nominal pressure" in caption and "Crosses are results of boundary" in caption
     assert not any(words in caption for words in ("reduced", "asperity model", "GFMD"))
 

@@ -99,7 +99,7 @@ def test_fig13_shows_one_surface_and_seed(tree):
     assert len(solid) == len(dashed) == 2
     assert any(line.get_ydata()[-1] == run["reduced_pressure"].values[line.get_ydata().size - 1] for line in solid)
     assert len({line.get_color() for line in solid}) == 2
-    assert figure.axes[0].get_title(loc="right") == "surface rough, seed 2"
+    assert figure.axes[0].get_title(loc="right") == "asperities, rough, seed 2"
     with pytest.raises(ValueError, match="no complete run has seed 7; complete runs have seed 1, 2"):
         fig13_loops.figure(tree, study="hard", seed=7)
 

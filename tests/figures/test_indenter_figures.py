@@ -114,7 +114,7 @@ def test_reasons_for_an_empty_figure():
 
 @pytest.mark.parametrize("module", FIGURES)
 def test_captions_exist(module):
-    assert len(caption_of(module.__name__.rsplit(".", 1)[1])) > 200
+    assert len(caption_of(module.__name__.rsplit(".", 1)[1], "")) > 200
 
 
 def test_statements_on_validity_if_surfaces_have_slopes_of_their_own():

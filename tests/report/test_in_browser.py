@@ -43,9 +43,10 @@ def report_file(tmp_path_factory):
         ("fig1_jkr", fig1_jkr.figure(), ()),
         ("fig2_area_and_gap", fig2_area_and_gap.figure(tree, study="slopes"), ("slopes",)),
     ):
-        files = [folder / "figures" / f"{name}.{ending}" for ending in ("png", "pdf")]
-        save(figure, *files)
-        pictures.append(ReportFigure(name, f"Caption of {name}.", *files, studies))
+        files = [folder / "figures" / f"{name}.{ending}" for ending in ("png", "pdf", "txt")]
+        save(figure, *files[:2])
+        files[2].write_text(f"Caption of {name}.\n")
+        pictures.append(ReportFigure(name, *files, studies))
     write_report(
         folder / "report.html",
         campaign=tree,

@@ -83,7 +83,12 @@ def parts(tmp_path_factory):
 
 @pytest.fixture
 def picture(tmp_path):
-    return lambda name, *studies, caption="": ReportFigure(name, caption, *(tmp_path / f for f in FIGURES), studies)
+    def picture(name, *studies, caption=""):
+        text = tmp_path / f"{name}.txt"
+        text.write_text(f"{caption}\n")
+        return ReportFigure(name, *(tmp_path / f for f in FIGURES), text, studies)
+
+    return picture
 
 
 @pytest.fixture
@@ -95,7 +100,7 @@ def write(tmp_path, parts, picture):
     def written(name="report.html", **changes):
         arguments = {
             "campaign": small.tree(),
-            "figures": [picture("fig1_jkr", caption=caption_of("fig1_jkr"))],
+            "figures": [picture("fig1_jkr", caption=caption_of("fig1_jkr", ""))],
             "checks": [] if "campaign" in changes else checks,
             "surfaces": [read_dataset(tmp_path / "s.nc")],
             "configuration": "name: small\ntext: <script>alert('no')</script>\n",

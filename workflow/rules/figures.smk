@@ -1,4 +1,4 @@
-# figures/<name>.png and .pdf. A figure depends on the data, on its options and on its code. The module of a figure
+# figures/<name>.png, .pdf and .txt, the caption. A figure depends on the data, on its options and on its code. The module of a figure
 # declares the inputs and the arguments (icha/figures/fig*.py).
 
 from icha.datasets.results import ResultFiles
@@ -22,6 +22,7 @@ rule figure:
     output:
         png="<results>/figures/{name}.png",
         pdf="<results>/figures/{name}.pdf",
+        text="<results>/figures/{name}.txt",
     log:
         "<logs>/figures/{name}.log",
     benchmark:
@@ -33,6 +34,7 @@ rule figure:
         runtime=10,
     params:
         arguments=lambda wildcards: FIGURES[wildcards.name].arguments(CAMPAIGN),
+        studies=lambda wildcards: FIGURES[wildcards.name].studies_of(CAMPAIGN),
         # Tables of measurements are compared by content, not by time.
         sha256=lambda wildcards: [sha256_of(Path(table)) for table in FIGURE_INPUTS[wildcards.name].get("tables", ())],
         code=lambda wildcards: code_of("draw_figure.py", f"icha.figures.{wildcards.name}"),

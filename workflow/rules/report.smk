@@ -28,10 +28,7 @@ rule report_page:
         mem_mb=4000,
         runtime=10,
     params:
-        figures={
-            name: (options.studies_of(CAMPAIGN), getattr(options, "units", "reduced"))
-            for name, options in CAMPAIGN.figures.by_name().items()
-        },
+        figures={name: options.studies_of(CAMPAIGN) for name, options in CAMPAIGN.figures.by_name().items()},
         citations=as_it_is([measurement.citation for measurement in CAMPAIGN.measurements.values()]),
         benchmarks=f"{RESULTS}/benchmarks",
         further_software=further_software(CAMPAIGN),

@@ -10,6 +10,8 @@ if "snakemake" in globals():
             snakemake.wildcards.name,
             snakemake.output.png,
             snakemake.output.pdf,
+            snakemake.output.text,
             inputs=dict(snakemake.input.items()),
             arguments=snakemake.params.arguments,
+            studies=snakemake.params.studies,
         )

@@ -6,7 +6,6 @@ from job import job_context
 
 from icha.analysis.checks import read_checks
 from icha.datasets.files import read_campaign
-from icha.figures.captions import caption_of, contents_of
 from icha.report.report import ReportFigure, write_report
 from icha.report.run_times import write_times
 from icha.report.sections import read_surface_statistics
@@ -23,12 +22,8 @@ if "snakemake" in globals():
         linked |= {"Sampled cases": sensitivity} if sensitivity else {}
         linked |= {"Times and memory of the jobs": times} | ({"Error of the model": model_error} if model_error else {})
         campaign, errors = read_campaign(files.campaign), read_campaign(model_error) if model_error else None
-        shown = []
-        for (name, (studies, units)), png, pdf in zip(
-            params.figures.items(), files.figures[::2], files.figures[1::2], strict=True
-        ):
-            contents = contents_of(campaign, studies, errors, units) if studies else None
-            shown.append(ReportFigure(name, caption_of(name, contents), png, pdf, tuple(studies)))
+        figures = zip(params.figures.items(), *(files.figures[k::3] for k in range(3)), strict=True)
+        shown = [ReportFigure(name, *paths, tuple(studies)) for (name, studies), *paths in figures]
         write_report(
             page,
             campaign=campaign,
