@@ -4,11 +4,11 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
-import numpy as np
 import xarray as xr
 
 from icha.analysis.control_variates import PROBABILITY
 from icha.analysis.estimates import LOOP
+from icha.datasets import table
 from icha.path.targets import UNITS
 from icha.support.formatting import choose_unit, format_quantity
 
@@ -28,8 +28,6 @@ _LEVELS = {
     "fine_seeds": "boundary elements",
 }
 _STOPS = {"reduced_pressure": "p*", "relative_load": "p/E*", "area_fraction": "A/A0"}
-
-
 # If the half-width divided by the value is larger, the interval need not be symmetric, and its ends are printed.
 _WIDE = 0.3
 
@@ -70,7 +68,7 @@ class Answer(NamedTuple):
         """Estimate with interval, and the contributions to the interval, as text; a wide interval as its two ends."""
         digits = max(0, 1 - math.floor(math.log10(self.half_width))) if self.half_width > 0 else 3
         unit = f" {self.unit}" if self.unit else ""
-        parts = ", ".join(f"{name} {float(f'{part:.2g}'):g}" for name, part in self.shares.items())
+        parts = ", ".join(f"{name} {part:.{digits}f}" for name, part in self.shares.items())
         interval = f" ± {self.half_width:.{digits}f}{unit}"
         if self.half_width > _WIDE * self.value:
             interval = f", from {self.low:.{digits}f} to {self.high:.{digits}f}{unit}"
@@ -117,10 +115,7 @@ def unit_words(quantity: str, value: float, unit: str) -> tuple[float, str]:
         return 100.0, "%"
     if unit == "1":
         return 1.0, ""
-    # Such as Pa m^-1: the unit of the numerator gets a prefix.
-    numerator, _, denominator = unit.partition(" ")
-    factor, prefixed = choose_unit(value, numerator)
-    return factor, prefixed + {"": "", "m^-1": "/m", "m^-2": "/m²"}[denominator]
+    return choose_unit(value, unit)
 
 
 def state_words(kind: str, target: float) -> str:
@@ -182,16 +177,13 @@ def paragraph(name: str, answers: list[Answer]) -> str:
 
 def as_csv(answers: xr.DataTree) -> str:
     """Return all answers as a table in CSV, with one line of names."""
-    lines = ["study," + ",".join(str(name) for name in next(iter(answers.children.values())).data_vars)]
-    for study, node in answers.children.items():
-        columns = [node[name].values for name in node.data_vars]
-        lines += [",".join([study, *(_cell(value) for value in row)]) for row in zip(*columns, strict=True)]
-    return "\n".join(lines) + "\n"
+    import pandas as pd
 
-
-def _cell(value):
-    text = f"{value:.9g}" if isinstance(value, float | np.floating) else str(value)
-    return f'"{text}"' if "," in text else text
+    frames = {
+        study: pd.DataFrame({name: v.values for name, v in node.data_vars.items()})
+        for study, node in answers.children.items()
+    }
+    return table.as_csv(pd.concat(frames, names=["study"]).reset_index(level="study"))
 
 
 def as_latex(answers: xr.DataTree) -> Iterator[str]:

@@ -41,7 +41,7 @@ def sample_rows(data: xr.Dataset) -> list[dict]:
 def distribution_words(data: xr.Dataset, name: str) -> str:
     """Describe the distribution of a parameter, such as `hurst: uniform, lower end 0.5, upper end 0.9`."""
     attributes = data[name].attrs
-    kind, unit = attributes["distribution"], attributes["units"].replace(" m^-2", "/m²")
+    kind, unit = attributes["distribution"], attributes["units"]
     texts = [
         f"{number:g}" if unit == "1" else format_quantity(number, unit) for number in attributes["distribution_numbers"]
     ]

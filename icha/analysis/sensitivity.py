@@ -111,7 +111,7 @@ def _responses(models, kinds, results, points, distributions, nodes) -> Iterator
     normal = [each.is_normal for each in distributions]
     at = np.array([each.standardise(row) for each, row in zip(distributions, nodes, strict=True)])
     for (quantity, values), (m, model) in itertools.product(results.items(), enumerate(models)):
-        targets = range(values.shape[-1]) if values.ndim == len(("model", "seed", "case", "target")) else [-1]
+        targets = [-1] if quantity in ESTIMATED_OF_LOOPS else range(values.shape[-1])
         for target in targets:
             if target >= 0 and kinds[target] in ESTIMATED_AT_TARGETS[quantity]:
                 continue  # prescribed
@@ -136,21 +136,10 @@ def _responses(models, kinds, results, points, distributions, nodes) -> Iterator
 
 def _indices(found: Expansion | None, at, normal):
     """Return the indices and main effects of a fitted polynomial; NaN without polynomial."""
+    names = ("first_order", "total_order", "first_order_half_width", "total_order_half_width")
     if found is None:
-        nothing = np.full(len(at), np.nan)
-        names = ("first_order", "total_order", "first_order_half_width", "total_order_half_width")
-        return {"degree": 0, "unexplained": np.nan, "main_effect": np.full(at.shape, np.nan)} | dict.fromkeys(
-            names, nothing
-        )
-    first, total = found.indices(found.coefficients)
-    width_first, width_total = found.half_widths()
+        nothing = dict.fromkeys(names, np.full(len(at), np.nan))
+        return nothing | {"degree": 0, "unexplained": np.nan, "main_effect": np.full(at.shape, np.nan)}
+    indices = dict(zip(names, (*found.indices(found.coefficients), *found.half_widths()), strict=True))
     effects = [found.main_effect(k, row, normal=normal[k]) for k, row in enumerate(at)]
-    return {
-        "degree": found.degree,
-        "unexplained": found.error,
-        "first_order": first,
-        "total_order": total,
-        "first_order_half_width": width_first,
-        "total_order_half_width": width_total,
-        "main_effect": np.exp(effects),
-    }
+    return indices | {"degree": found.degree, "unexplained": found.error, "main_effect": np.exp(effects)}

@@ -257,7 +257,7 @@ def statements_on_dataset(campaign: xr.DataTree) -> list[Statement]:
     models, cases, shares, sticky = {}, [], {}, {}
     for name, node in campaign.children.items():
         if is_derived_study(name, campaign.children):
-            continue  # the estimates correct the error of the coarse grid
+            continue  # runs for an answer, of which no user asked
         study = node.to_dataset()
         models[name] = [str(model) for model in study["model"].values]
         cases += _cases(study)

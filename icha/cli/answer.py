@@ -15,6 +15,8 @@ def answer(
 ) -> None:
     """Print the results of each study with intervals, what limits their accuracy, and what would narrow them.
 
+    A study with `sample` has a table of results, with the share of their variance that each parameter causes.
+
     A study has answers if it has boundary elements for two seeds or more. The key `levels` of a study gives the seeds
     of three levels of accuracy, which together need less time than boundary elements for every seed. With the key
     `accuracy`, `icha run` chooses these seeds.
@@ -31,17 +33,17 @@ def answer(
             f"{file}: there are no answers; expected a campaign with `levels`, with boundary elements for several "
             "seeds, or with `sample`, that `icha run` has computed"
         )
-    tree = read_campaign(file) if file.is_file() else None
-    if (csv or latex) and tree is None:
-        raise UserError(f"{file}: there are no estimates with intervals; the sampled cases are in {sampled}")
     if csv or latex:
+        if not file.is_file():
+            raise UserError(f"{file}: there are no estimates with intervals; the sampled cases are in {sampled}")
+        tree = read_campaign(file)
         echo(as_csv(tree).rstrip("\n") if csv else "\n".join(as_latex(tree)))
         return
-    if sampled.is_file():
-        for node in read_campaign(sampled).children.values():
-            echo(sample_table(node.to_dataset()))
-            echo()
-    for name, node in tree.children.items() if tree else ():
+    samples, estimates = (read_campaign(each).children if each.is_file() else {} for each in (sampled, file))
+    for node in samples.values():
+        echo(sample_table(node.to_dataset()))
+        echo()
+    for name, node in estimates.items():
         answers = answers_of(node.to_dataset())
         echo(paragraph(name, answers))
         for each in answers:

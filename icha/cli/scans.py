@@ -88,8 +88,8 @@ def _defects(scan, to_scale: bool) -> Iterator[str]:
         taken = f"a paraboloid takes {defects.curvature:.0%} of the variance"
         advice = "; if the sample is curved, write `detrend: curvature`"
         yield f"{taken}{' and was removed' if settings.detrend == 'curvature' else advice}"
-    if left := keys_for_defects(scan):
-        yield f"write {' and '.join(left)}; then `icha describe` judges the surface without the defects"
+    if left := " and ".join(f"`{key}`" for key in keys_for_defects(scan)):
+        yield f"write {left}; then `icha describe` judges the surface without the defects"
     elif scan.anisotropy > ANISOTROPIC:
         yield (
             f"anisotropic: the largest rms slope of all directions is {scan.anisotropy:.2g} times the smallest; the "
@@ -100,8 +100,8 @@ def _defects(scan, to_scale: bool) -> Iterator[str]:
 def keys_for_defects(scan) -> list[str]:
     """Return the keys that remove outliers and steps between lines, such as `outliers: remove`, if they are not set."""
     defects, settings = scan.defects, scan.settings
-    found = ["`outliers: remove`"] if defects.outliers and settings.outliers == "keep" else []
-    return found + [f"`levelling: {each}`" for each in defects.offsets if settings.levelling != each]
+    found = ["outliers: remove"] if defects.outliers and settings.outliers == "keep" else []
+    return found + [f"levelling: {each}" for each in defects.offsets if settings.levelling != each]
 
 
 def _resolution(scan, to_scale: bool, models: list[Model]) -> Iterator[str]:
@@ -190,7 +190,6 @@ def read_measured_section(path: Path, data: str | None, folder: Path) -> dict[st
         raise UserError(f"--measured {path}: {problem}; expected a file with a topography")
     scan, guessed, missing = _load(path, data)
     rows, columns = scan.heights.shape
-    gaps = int(np.count_nonzero(~np.isfinite(scan.heights)))
     settings = {"format": "auto", "boundary": "free", "data": data, "detrend": "tilt", "missing": "fill"} | guessed
     try:
         resolution = examine_scan(path, settings)
@@ -210,11 +209,9 @@ def read_measured_section(path: Path, data: str | None, folder: Path) -> dict[st
         lines.append(
             "scattered: interpolate       # the points are on no regular grid; with `refuse`, this is an error"
         )
-    if gaps:
-        lines.append(f"missing: fill                # {gaps} points have no height; with `refuse`, this is an error")
-    lines += [
-        f"# {key.strip('`'):<27}# recommended; see the output of `icha new`" for key in keys_for_defects(resolution)
-    ]
+    if not np.isfinite(scan.heights).all():
+        lines.append("missing: fill                # some points have no height; with `refuse`, this is an error")
+    lines += [f"# {key:<27}# recommended; see the output of `icha new`" for key in keys_for_defects(resolution)]
     advice = {} if missing or keys_for_defects(resolution) else format_advice(resolution.advice)
     if resolution.defects.curvature > MUCH_CURVATURE:
         advice["detrend"] = "curvature"

@@ -451,7 +451,7 @@ def sampled_parameters(campaign: Campaign) -> dict[str, tuple[list[tuple], dict[
         found[label] = (
             list(dict.fromkeys(cases)),
             {
-                name: (RULES[name].unit.replace("/m^2", " m^-2"), *distribution, [case[name] for case in values])
+                name: (_unit_in_cf(RULES[name]), *distribution, [case[name] for case in values])
                 for name, distribution in study.sample.distributions.items()
             },
         )
@@ -462,4 +462,8 @@ def unit_of(section, name: str) -> str:
     """Return the SI unit of a key of a section, in the notation of CF; "" for a key without a unit."""
     field = type(section).model_fields.get(name)
     rule = rule_of(field) if field else None
-    return rule.unit.replace("/m^2", " m^-2") if rule else ""
+    return _unit_in_cf(rule) if rule else ""
+
+
+def _unit_in_cf(rule):
+    return rule.unit.replace("/m^2", " m^-2")

@@ -54,6 +54,7 @@ _LOWER = 0.42
 _SAME_LOAD = 1e-6
 # Ticks of the separation axis, if the ratio of the ends of this axis is less than 60.
 _SEPARATIONS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5)
+# Look of Ciavarella's estimate from boundary elements without adhesion.
 _ESTIMATE = {"ls": (0, (6, 1.5, 1, 1.5, 1, 1.5)), "lw": 0.9, "zorder": 1.9}
 # Each entry has two parts: the function that returns the points of a run, and the symbol of the quantity.
 _QUANTITIES = ((curves.area_points, "A"), (curves.gap_points, r"\bar{u}"))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pydantic import Field
 
-from icha.contact.models import MODELS, first_model
+from icha.contact.models import MODELS
 from icha.datasets import results
 from icha.figures.declaration import Campaign, Inputs, StudyFigure
 from icha.support.formatting import choose_unit
@@ -69,7 +69,7 @@ def responses(data: xr.Dataset, target: int) -> xr.Dataset:
 
 def best_model(models: Sequence[str]) -> str:
     """Return boundary elements if a study has them, otherwise the asperity model."""
-    return next((name for name in reversed(MODELS) if name in models), first_model(models))
+    return next(name for name in reversed(MODELS) if name in models)
 
 
 def title_of(data: xr.Dataset, row: xr.Dataset) -> str:
@@ -94,6 +94,5 @@ def scale_of(data: xr.Dataset, name: str) -> tuple[float, str]:
     unit = data[name].attrs["units"]
     if unit == "1":
         return 1.0, symbol(name)
-    numerator, _, denominator = unit.partition(" ")
-    factor, prefixed = choose_unit(float(np.abs(data[name].values).max()), numerator)
-    return factor, f"{symbol(name)} ({prefixed}{'/m²' if denominator else ''})"
+    factor, prefixed = choose_unit(float(np.abs(data[name].values).max()), unit)
+    return factor, f"{symbol(name)} ({prefixed})"

@@ -36,9 +36,7 @@ class Distribution(NamedTuple):
     @property
     def _ends(self) -> tuple[float, float]:
         """Centre and scale of a normal distribution, or both ends of a uniform distribution."""
-        if self.kind == "lognormal":
-            return math.log(self.first), math.log(self.second)
-        if self.kind == "loguniform":
+        if self.kind.startswith("log"):
             return math.log(self.first), math.log(self.second)
         return self.first, self.second
 

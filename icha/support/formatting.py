@@ -40,10 +40,13 @@ def size(count: float) -> str:
 
 
 def choose_unit(value: float, unit: str) -> tuple[float, str]:
-    """Choose the unit prefix with which `value` (SI) is between 1 and 1000; return the factor and the prefixed unit."""
+    """Choose the unit prefix with which `value` (SI) is between 1 and 1000; return the factor and the prefixed unit.
+
+    Units in the notation of CF, such as `J m^-2`, are written with a slash.
+    """
     exponent = 0 if value == 0 else math.floor(math.log10(abs(value)) / 3 + 1e-9) * 3
     exponent = min(max(exponent, min(_PREFIXES)), max(_PREFIXES))
-    return 10.0**-exponent, f"{_PREFIXES[exponent]}{unit}"
+    return 10.0**-exponent, _PREFIXES[exponent] + unit.replace(" m^-1", "/m").replace(" m^-2", "/m²")
 
 
 def format_quantity(value: float, unit: str) -> str:

@@ -48,7 +48,10 @@ def results_of(project):
 
 def test_all_promised_files_exist(smoke):
     files = results_of(smoke)
-    promised = {*PROMISED.split(), *(f"figures/{figure}.{ending}" for figure in FIGURES for ending in ("png", "pdf", "txt"))}
+    promised = {
+        *PROMISED.split(),
+        *(f"figures/{figure}.{ending}" for figure in FIGURES for ending in ("png", "pdf", "txt")),
+    }
     assert promised <= files.keys()
     results = smoke / "results/smoke"
     for job in [file for file in files if file.startswith(("surfaces", "runs"))]:
