@@ -259,8 +259,9 @@ class Campaign(Section):
                 reason = "is also the name of a study with boundary elements; expected another name"
                 yield ("finite_range", label), label, reason
 
-    def measurement_problems(self) -> Iterator[Problem]:
-        """Yield a problem for each table of measurements that cannot be read."""
+    def file_problems(self) -> Iterator[Problem]:
+        """Yield a problem for each table of measurements, and each script of an own figure, that cannot be used."""
+        yield from self.figures.script_problems()
         for label, entry in self.measurements.items():
             try:
                 read_columns(entry.path, entry.columns)
@@ -358,6 +359,7 @@ class Campaign(Section):
             update={
                 "surfaces": {n: in_folder(s) if s.from_file else s for n, s in self.surfaces.items()},
                 "measurements": {name: in_folder(m) for name, m in self.measurements.items()},
+                "figures": self.figures.in_folder(folder),
             }
         )
 

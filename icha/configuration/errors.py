@@ -11,6 +11,7 @@ from pydantic import BaseModel
 
 from icha.configuration.campaign import Campaign
 from icha.configuration.surfaces import SURFACE_KINDS
+from icha.figures.own_figure import OwnFigure
 from icha.support.formatting import printable
 from icha.support.values import NAME_PATTERN, NOTHING, Problem
 
@@ -79,6 +80,9 @@ def problem_of(details: Mapping) -> Problem:
     if kind == "value_error":
         # The message for a whole section already contains keys and values.
         return location, NOTHING if isinstance(value, Mapping | BaseModel) else value, str(context["error"])
+    if kind == "missing" and location[0] == "figures" and location[2:] == ("script",):
+        reason = _reason_for_key("extra_forbidden", location[:-1])
+        return location[:-1], NOTHING, f"{reason}; or a figure of your own with the key 'script'"
     if kind in ("extra_forbidden", "missing"):
         return location, NOTHING, _reason_for_key(kind, details["loc"])
     if kind in ("union_tag_not_found", "union_tag_invalid"):
@@ -119,7 +123,12 @@ def _section_at(location: tuple) -> type[BaseModel]:
         if model in SURFACE_KINDS.values() and key in SURFACE_KINDS:
             model = SURFACE_KINDS[key]
             continue
-        model = get_args(model)[-1] if get_origin(model) in (dict, list) else model.model_fields[key].annotation
+        if get_origin(model) in (dict, list):
+            model = get_args(model)[-1]
+        elif key in model.model_fields:
+            model = model.model_fields[key].annotation
+        else:
+            model = OwnFigure  # the only section with names of the user's own among its keys
         while get_origin(model) in (Annotated, Union, UnionType):
             model = get_args(model)[0]
     return model

@@ -1,12 +1,14 @@
 """Sections `figures` (one key for every figure) and `measurements` (measured contact areas for figure 5)."""
 
 from collections.abc import Iterator
-from typing import Annotated, Any
+from pathlib import Path
+from typing import Annotated, Any, Self
 
-from pydantic import Field, create_model, model_validator
+from pydantic import ConfigDict, Field, create_model, model_validator
 
 from icha.figures.declaration import FigureOptions
-from icha.figures.registry import DECLARATIONS
+from icha.figures.own_figure import OwnFigure, caption_in
+from icha.figures.registry import DECLARATIONS, figure_number
 from icha.support.values import File, Name, Positive, Problem, Section, Text, conversion_factor, unknown
 
 
@@ -78,15 +80,35 @@ class Measurement(Section):
 
 
 class _Drawn(Section):
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[Name, OwnFigure]
+
     def by_name(self) -> dict[str, FigureOptions]:
         """Return the options of each figure to draw, by the name of the figure."""
-        return {name: getattr(self, name) for name in type(self).model_fields if getattr(self, name) is not None}
+        drawn = {name: getattr(self, name) for name in type(self).model_fields}
+        return {name: options for name, options in drawn.items() if options is not None} | self.model_extra
+
+    def in_folder(self, folder: Path) -> Self:
+        """Return the figures with `folder` in front of the paths of the scripts."""
+        own = {n: each.model_copy(update={"script": str(folder / each.script)}) for n, each in self.model_extra.items()}
+        return self.model_copy(update=own)
+
+    def script_problems(self) -> Iterator[Problem]:
+        """Yield a problem for each script that cannot draw a figure."""
+        for name, own in self.model_extra.items():
+            try:
+                caption_in(own.script)
+            except ValueError as error:
+                yield ("figures", name, "script"), own.script, str(error)
+            if figure_number(name):
+                yield ("figures", name), name, "begins like the name of a figure of ICHA; expected another name"
 
 
 Figures = create_model(
     "Figures",
     __base__=_Drawn,
-    __doc__="Figures of the campaign. Each key is the name of a figure. ICHA draws only the figures that are given.",
+    __doc__="Figures of the campaign. Each key is the name of a figure. ICHA draws only the figures that are given. "
+    "Other names are figures of your own.",
     __module__=__name__,
     **{
         name: (declaration.options | None, Field(default=None, description=declaration.description))

@@ -91,7 +91,7 @@ def _load(path: Path, origin: str, written: Mapping, within: str | os.PathLike |
     text, confirmed = dump_yaml(written, origin), written.get(CONFIRMED)
     refuse(origin, _files_outside(campaign, within) if within is not None else ())
     topographies, unread = inspect_topographies(campaign)
-    refuse(origin, itertools.chain(unread, campaign.measurement_problems()))
+    refuse(origin, itertools.chain(unread, campaign.file_problems()))
     campaign = campaign.with_topographies(topographies)
     for name, each in topographies.items():
         location = "surfaces", campaign.origin("surfaces", name)
@@ -165,16 +165,21 @@ def _check_text(path: Path, origin: str, written: Mapping) -> Campaign:
 
 
 def _named_files(campaign: Campaign) -> dict[tuple[str, str], str]:
-    """Return the paths of the files of surfaces and measurements, by section and entry."""
+    """Return the paths of the files of surfaces, measurements and own figures, by section and entry."""
     files = {("surfaces", name): each.path for name, each in campaign.surfaces.items() if each.from_file}
+    files |= {("figures", name): each.script for name, each in campaign.figures.model_extra.items()}
     return files | {("measurements", name): each.path for name, each in campaign.measurements.items()}
+
+
+def _key_of_path(section: str) -> str:
+    return "script" if section == "figures" else "path"
 
 
 def _files_outside(campaign: Campaign, folder: str | os.PathLike) -> list[Problem]:
     """Return a problem for each of a campaign's files that lies outside a folder; links are resolved first."""
     return [
         (
-            (section, campaign.origin(section, name), "path"),
+            (section, campaign.origin(section, name), _key_of_path(section)),
             path,
             "is outside the folder of the configuration; expected files in this folder",
         )
@@ -206,8 +211,8 @@ def collect_inputs(configuration: Configuration) -> tuple[str, dict[str, str]]:
     files = {}
     for (section, name), path in named.items():
         stored = str(PurePosixPath(INPUTS, section, name, Path(path).name))
-        content[section][name] = (content[section][name] or {}) | {"path": stored}
-        if section == "measurements" or (section, name) in used:
+        content[section][name] = (content[section][name] or {}) | {_key_of_path(section): stored}
+        if section != "surfaces" or (section, name) in used:
             files[stored] = path
     # Every surface from a file now has its own path, so the path is removed from the defaults.
     (content.get("defaults") or {}).get("surfaces", {}).pop("path", None)

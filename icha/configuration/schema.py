@@ -44,7 +44,8 @@ def key_tables() -> str:
 
 def _sections(section: dict, schema: dict, place: str) -> Iterator[tuple[str, str]]:
     """Yield class name and location of all sections inside a section, such as `Study` and `studies.<name>`."""
-    for key, value in section["properties"].items():
+    others = section.get("additionalProperties")
+    for key, value in (section["properties"] | ({"<name>": others} if others else {})).items():
         text = json.dumps(value)
         where = f"{place}{key}" + (".<name>" if "patternProperties" in text else "")
         for name in re.findall(r'"\$ref": "#/\$defs/(\w+)"', text):

@@ -1,4 +1,7 @@
-"""Find and draw the figures; each figure is a module of this folder whose name begins with `fig` and a number."""
+"""Find and draw the figures; each figure is a module of this folder whose name begins with `fig` and a number.
+
+The module `own_figure` draws all figures of the user's own, whose names do not begin in this way.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import icha.figures
 from icha.figures.captions import caption_of, texts_of
 from icha.figures.declaration import Declaration
+from icha.figures.own_figure import caption_in
 from icha.figures.style import GREY, in_style, new_figure, save
 from icha.support.atomic_files import whole_file
 
@@ -23,20 +27,31 @@ if TYPE_CHECKING:
 _NUMBERED = re.compile(r"fig(\d+)_")
 
 
-def figure_number(name: str) -> int:
-    """Return the number in the name of a figure."""
-    return int(_NUMBERED.match(name)[1])
+def figure_number(name: str) -> int | None:
+    """Return the number in the name of a figure; None for a figure of the user's own."""
+    numbered = _NUMBERED.match(name)
+    return numbered and int(numbered[1])
+
+
+def module_name(name: str) -> str:
+    """Return the name of the module that draws a figure."""
+    return f"icha.figures.{name if figure_number(name) else 'own_figure'}"
 
 
 def figure_module(name: str) -> ModuleType:
     """Import the module of a figure and return it."""
-    return importlib.import_module(f"icha.figures.{name}")
+    return importlib.import_module(module_name(name))
+
+
+def declaration_of(name: str) -> Declaration:
+    """Return the declaration of a figure."""
+    return figure_module(name).DECLARATION
 
 
 _MODULES = (module.name for module in pkgutil.iter_modules(icha.figures.__path__))
 _NAMES = sorted(filter(_NUMBERED.match, _MODULES), key=figure_number)
 # Declarations by the name of the figure, in the order of the numbers.
-DECLARATIONS: dict[str, Declaration] = {name: figure_module(name).DECLARATION for name in _NAMES}
+DECLARATIONS: dict[str, Declaration] = {name: declaration_of(name) for name in _NAMES}
 
 
 def draw_figure(
@@ -64,7 +79,7 @@ def draw_figure(
     data = {argument: _read(files) for argument, files in inputs.items()}
     try:
         figure = figure_module(name).figure(**data, **arguments)
-        caption = caption_of(name, texts_of(figure, data, studies))
+        caption = caption_in(data["script"]) if "script" in data else caption_of(name, texts_of(figure, data, studies))
     except NothingToDraw as reason:
         caption = f"Nothing to draw: {reason}."
         print(caption)

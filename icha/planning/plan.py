@@ -15,7 +15,7 @@ from icha.datasets import results as results_files
 from icha.datasets.attributes import why_no_result
 from icha.datasets.labels import RunLabels
 from icha.datasets.results import ResultFiles, job_file
-from icha.figures.registry import DECLARATIONS
+from icha.figures.registry import declaration_of
 from icha.path.targets import QUANTITIES
 from icha.planning import costs
 from icha.planning.costs import WORKFLOW
@@ -193,11 +193,12 @@ def _derived_files(campaign, files: CampaignFiles, computed: list[Item]) -> Iter
     result_files = ResultFiles(campaign.name)
     for name, options in campaign.figures.by_name().items():
         path = result_files.path(results_files.FIGURE, name=name, ending="png")
-        inputs = DECLARATIONS[name].inputs(campaign, options, result_files).values()
+        declaration = declaration_of(name)
+        inputs = declaration.inputs(campaign, options, result_files).values()
         shown = set(options.studies_of(campaign))
         count = sum(case.study in shown for case in files.runs.values())
         grids = [campaign.grid(surface) for study in shown for surface in campaign.studies[study].surfaces]
-        nodes = max(grids) ** 2 if DECLARATIONS[name].holds_topography else 0
+        nodes = max(grids) ** 2 if declaration.holds_topography else 0
         models = max((len(campaign.studies[study].models) for study in shown), default=1)
         flat = [path for each in inputs for path in ([each] if isinstance(each, str) else each)]
         cost_of_figure = cost("figure", count, 400e3, values, nodes=nodes, models=models)

@@ -172,7 +172,7 @@ def _pictures(figures: Sequence[ReportFigure], campaign: xr.DataTree, link) -> l
     pictures = [
         {
             "name": figure.name,
-            "number": figure_number(figure.name),
+            "number": figure_number(figure.name) or figure.name,
             "caption": _caption(figure, campaign),
             "data": base64.b64encode(Path(figure.png).read_bytes()).decode("ascii"),
             "pdf": link(figure.pdf),

@@ -100,6 +100,7 @@ def test_pipes_and_devices_are_not_opened(tmp_path, refused):
         columns = {"load": {"column": "a", "unit": "1"}, "area": {"column": "b", "unit": "1"}}
         entry = {"path": path, "label": "a", "citation": "b", "study": "one"} | columns
         refused("measurements", {"m": entry}, f"measurements.m.path: '{path}' {other}")
+        refused("figures", {"mine": {"study": "one", "script": path}}, f"figures.mine.script: '{path}' {other}")
 
 
 WRONG = {

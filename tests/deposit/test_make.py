@@ -67,11 +67,21 @@ measurements:
     area: {{column: a, unit: percent}}
 figures:
   fig5_multi_slope: {{study: load}}
+  spots: {{study: load, script: ../measured/spots.py}}
 publication:
   version: "1.0.0"
   date: 2026-01-31
   authors:
     - {{family_names: Carberry, given_names: Josiah, orcid: 0000-0002-1825-0097}}
+"""
+SPOTS = """
+from matplotlib.figure import Figure
+
+def draw(study):
+    'Number of spots against load.'
+    figure = Figure()
+    figure.subplots().plot(study["reduced_pressure"].squeeze(), study["spot_count"].squeeze(), "o")
+    return figure
 """
 RUN = "load/plate/seed0/slope0.5/soft"
 
@@ -84,6 +94,7 @@ def project(tmp_path_factory):
     (home / "measured").mkdir()
     np.save(home / "measured/heights of a plate.npy", 1e6 * small.surface().heights)
     (home / "measured/areas.csv").write_text("p,a\n0.001,0.3\n0.01,2\n")
+    (home / "measured/spots.py").write_text(SPOTS)
     (home / "asked").mkdir()
     (home / "asked/tiny.yaml").write_text(CAMPAIGN.format(absolute=home / "measured"))
     command, environment = snakemake_command("publish", configuration=home / "asked/tiny.yaml")
@@ -117,6 +128,9 @@ def test_a_deposit_has_everything_and_nothing_else(project, published):
         *("surfaces", "references", "figures", "report.html", "checks.json", "verdict.txt", "source"),
     }
     assert f"runs/{RUN}.nc" in present and "figures/fig5_multi_slope.pdf" in present
+    assert present["inputs/figures/spots/spots.py"].read_text() == SPOTS
+    assert present["figures/spots.txt"].read_text() == "Number of spots against load.\n"
+    assert "Number of spots against load." in present["report.html"].read_text()
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=project, capture_output=True).stdout.decode()
     assert {path for path in present if path.startswith("source/")} == {
         f"source/{path}" for path in listed.split("\0")[:-1]
@@ -215,6 +229,7 @@ def test_computed_again_it_has_the_same_bytes(published, tmp_path):
     done = CliRunner().invoke(app, ["reproduce", f"{published}.zip", "--folder", str(tmp_path / "again")])
     assert done.exit_code == 0, done.output
     computed = [path for path in files_of(published) if path.endswith((".nc", ".png", ".pdf"))]
+    computed += [path for path in files_of(published) if path.startswith("figures/") and path.endswith(".txt")]
     computed += [path for path in files_of(published) if path.startswith("dataset/") and path.endswith(".csv")]
     assert f"identical: every value in {len(computed) + 3} files" in done.output  # report, checks, verdict
 
@@ -373,12 +388,19 @@ def test_files_are_stored_with_the_configuration(tmp_path):
     np.savetxt(tmp_path / "scan.txt", np.round(1e9 * small.surface().heights, 3))
     np.savetxt(tmp_path / "sub/scan.txt", np.round(2e9 * small.surface().heights.T, 3))
     (tmp_path / "areas.csv").write_text("p,a\n0.001,0.3\n")
+    (tmp_path / "spots.py").write_text(SPOTS)
+    campaign["figures"]["spots"]["script"] = "spots.py"
     campaign["measurements"]["lab"]["path"] = str(tmp_path / "areas.csv")
     (tmp_path / "asked.yaml").write_text(yaml.safe_dump(campaign))
     asked = load_configuration(tmp_path / "asked.yaml")
     text, files = collect_inputs(asked)
     assert str(tmp_path) not in text and "nobody" not in text
-    places = ("measurements/lab/areas.csv", "surfaces/one/scan.txt", "surfaces/other/scan.txt")
+    places = (
+        "figures/spots/spots.py",
+        "measurements/lab/areas.csv",
+        "surfaces/one/scan.txt",
+        "surfaces/other/scan.txt",
+    )
     assert sorted(files) == [f"inputs/{place}" for place in places]
     kept = tmp_path / "kept"
     for place, file in files.items():

@@ -108,6 +108,8 @@ def folder(tmp_path_factory):
     write_data(folder / "config/data")
     shutil.copytree(ROOT / "config/topographies", folder / "config/topographies")
     (folder / "config/campaigns").mkdir()
+    (drawing,) = (block for _, block in blocks(DOCS / "howto/gallery.md", "python") if "def draw" in block)
+    (folder / "config/campaigns/spots.py").write_text(drawing, encoding="utf-8")
     return folder
 
 

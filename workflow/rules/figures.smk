@@ -2,14 +2,22 @@
 # declares the inputs and the arguments (icha/figures/fig*.py).
 
 from icha.datasets.results import ResultFiles
-from icha.figures.registry import DECLARATIONS
+from icha.figures.registry import declaration_of, module_name
 from icha.planning.requirements import figure_memory
 from icha.support.checksums import sha256_of
 
 RESULT_FILES = ResultFiles(CAMPAIGN.name, RESULTS)
 FIGURES = CAMPAIGN.figures.by_name()
 # Input files of each figure. The keys are the arguments of the function that draws the figure.
-FIGURE_INPUTS = {name: DECLARATIONS[name].inputs(CAMPAIGN, options, RESULT_FILES) for name, options in FIGURES.items()}
+FIGURE_INPUTS = {
+    name: declaration_of(name).inputs(CAMPAIGN, options, RESULT_FILES) for name, options in FIGURES.items()
+}
+
+
+def given_files(name):
+    """Return the paths of the user's files that a figure needs."""
+    inputs = FIGURE_INPUTS[name]
+    return [*inputs.get("tables", ()), *([inputs["script"]] if "script" in inputs else [])]
 
 
 wildcard_constraints:
@@ -30,14 +38,14 @@ rule figure:
     conda:
         "../envs/icha.yaml"
     resources:
-        mem_mb=lambda wildcards: figure_memory(CAMPAIGN, holds_topography=DECLARATIONS[wildcards.name].holds_topography),
+        mem_mb=lambda wildcards: figure_memory(CAMPAIGN, holds_topography=declaration_of(wildcards.name).holds_topography),
         runtime=10,
     params:
         arguments=lambda wildcards: FIGURES[wildcards.name].arguments(CAMPAIGN),
         studies=lambda wildcards: FIGURES[wildcards.name].studies_of(CAMPAIGN),
-        # Tables of measurements are compared by content, not by time.
-        sha256=lambda wildcards: [sha256_of(Path(table)) for table in FIGURE_INPUTS[wildcards.name].get("tables", ())],
-        code=lambda wildcards: code_of("draw_figure.py", f"icha.figures.{wildcards.name}"),
+        # Tables of measurements and scripts of own figures are compared by content, not by time.
+        sha256=lambda wildcards: [sha256_of(Path(file)) for file in given_files(wildcards.name)],
+        code=lambda wildcards: code_of("draw_figure.py", module_name(wildcards.name)),
     message:
         "Figure {wildcards.name}"
     script:

@@ -32,7 +32,7 @@ rule report_page:
         citations=as_it_is([measurement.citation for measurement in CAMPAIGN.measurements.values()]),
         benchmarks=f"{RESULTS}/benchmarks",
         further_software=further_software(CAMPAIGN),
-        code=code_of("make_report.py", *(f"icha.figures.{name}" for name in CAMPAIGN.figures.by_name())),
+        code=code_of("make_report.py", *(sorted({module_name(name) for name in CAMPAIGN.figures.by_name()}))),
     message:
         "Report"
     script:

@@ -1,0 +1,80 @@
+"""A figure that a Python file of the user draws: its function `draw` receives a study and returns a figure."""
+
+from __future__ import annotations
+
+import ast
+import os
+import runpy
+import traceback
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pydantic import Field
+
+from icha.datasets import results
+from icha.figures.declaration import Campaign, Declaration, Inputs, StudyFigure
+from icha.figures.style import in_style
+from icha.support.input_files import problem_with_path
+from icha.support.values import File
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+
+class OwnFigure(StudyFigure):
+    """A figure of your own. The key is the name of its files."""
+
+    script: File = Field(
+        description="Python file with a function `draw(study)`. The function receives the dataset of the study "
+        "(xarray.Dataset), and returns a figure of matplotlib. Its docstring is the caption. The path is relative to "
+        "the configuration file."
+    )
+
+    def arguments(self, campaign: Campaign) -> dict:
+        """Return the name of the study; the script is an input."""
+        return {"study": self.study}
+
+
+def inputs(campaign: Campaign, options: OwnFigure, files: results.ResultFiles) -> Inputs:
+    """Return the paths of the campaign dataset and of the script."""
+    return {"campaign": files.path(results.DATASET), "script": options.script}
+
+
+DECLARATION = Declaration(description="A figure that a Python file draws.", options=OwnFigure, inputs=inputs)
+
+
+def caption_in(script: str | os.PathLike) -> str:
+    """Return the docstring of the function `draw` in a script, without running the script.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read, is not Python, or has no such function.
+    """
+    if problem := problem_with_path(Path(script)):
+        raise ValueError(f"{problem}; expected a Python file")
+    try:
+        tree = ast.parse(Path(script).read_bytes(), Path(script).name)
+    except (SyntaxError, ValueError) as error:
+        raise ValueError(f"is not a Python file: {error}; expected a file with a function draw(study)") from None
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef) and node.name == "draw":
+            return " ".join((ast.get_docstring(node) or "").split())
+    raise ValueError("has no function `draw`; expected `def draw(study):`, which returns a figure of matplotlib")
+
+
+@in_style
+def figure(campaign: xr.DataTree, script: str, *, study: str) -> Figure:
+    """Draw a study with the function `draw` of a script, in the style of all figures."""
+    from matplotlib.figure import Figure
+
+    try:
+        drawn = runpy.run_path(script)["draw"](campaign[study].to_dataset())
+    except Exception as error:
+        traceback.print_exc()
+        lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == script]
+        raise ValueError(f"{script}, line {lines[-1] if lines else 1}: {type(error).__name__}: {error}") from None
+    if not isinstance(drawn, Figure):
+        raise ValueError(f"{script}: draw returned {type(drawn).__name__}; expected a figure of matplotlib")
+    return drawn

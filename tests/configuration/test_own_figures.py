@@ -1,0 +1,92 @@
+"""Figures of the user's own: what a script draws, and scripts that cannot draw."""
+
+import re
+
+import pytest
+import small_campaign as small
+
+from icha.datasets.campaign_file import write_campaign
+from icha.figures.own_figure import OwnFigure
+from icha.figures.registry import draw_figure
+
+AREAS = '''
+import matplotlib.pyplot as plt
+
+def draw(study):
+    """Contact area
+    against load."""
+    figure, axes = plt.subplots()
+    for seed in study["seed"].values:
+        run = study.sel(seed=seed).squeeze()
+        axes.plot(run["reduced_pressure"], run["contact_area_fraction"], label=f"seed {seed}")
+    return figure
+'''
+
+
+@pytest.fixture
+def draw(tmp_path):
+    """A function that draws the study `single` of the small campaign with a script."""
+    write_campaign(small.runs(), tmp_path / "small.nc", attrs={"title": "Small", "summary": "Small."})
+    files = [tmp_path / f"mine.{ending}" for ending in ("png", "pdf", "txt")]
+
+    def drawn(text):
+        script = tmp_path / "mine.py"
+        script.write_text(text)
+        inputs = {"campaign": str(tmp_path / "small.nc"), "script": str(script)}
+        draw_figure("mine", *files, inputs=inputs, arguments={"study": "single"}, studies=["single"])
+        return files
+
+    return drawn
+
+
+def test_a_script_draws_a_figure_with_its_docstring_as_caption(draw, tmp_path):
+    png, pdf, caption = draw(AREAS)
+    assert caption.read_text() == "Contact area against load.\n"
+    first = png.read_bytes(), pdf.read_bytes()
+    draw(AREAS)
+    assert (png.read_bytes(), pdf.read_bytes()) == first, "the same bytes"
+    assert not list(tmp_path.glob("__pycache__"))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (AREAS.replace('"reduced_pressure"', '"load"'), r"mine.py, line 10: KeyError: .*load"),
+        (AREAS.replace("return figure", "return axes"), "mine.py: draw returned Axes; expected a figure of matplotlib"),
+        ("import nothing_of_this_name\n" + AREAS, "mine.py, line 1: ModuleNotFoundError"),
+    ],
+)
+def test_errors_of_a_script_name_its_line(draw, text, message, tmp_path):
+    with pytest.raises(ValueError, match=message):
+        draw(text)
+    assert not (tmp_path / "mine.txt").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (None, "no such file; expected a Python file"),
+        ("def draw(study:\n", "is not a Python file: "),
+        ("def plot(study):\n    pass\n", "has no function `draw`; expected `def draw(study):`"),
+    ],
+)
+def test_scripts_are_refused_before_anything_is_computed(load, text, message, tmp_path):
+    if text is not None:
+        (tmp_path / "mine.py").write_text(text)
+    with pytest.raises(ValueError, match=f"figures.mine.script: .* {re.escape(message)}"):
+        load({"figures": {"mine": {"study": "one", "script": "mine.py"}}})
+
+
+def test_names_of_own_figures(load, tmp_path):
+    (tmp_path / "mine.py").write_text(AREAS)
+    entry = {"study": "one", "script": "mine.py"}
+    figures = load({"figures": {"mine": entry, "fig1_jkr": {}}}).campaign.figures.by_name()
+    assert list(figures) == ["fig1_jkr", "mine"] and isinstance(figures["mine"], OwnFigure)
+    for name, given, message in (
+        ("fig99_mine", entry, "begins like the name of a figure of ICHA"),
+        ("My figure", entry, "is not a valid name"),
+        ("fig2_area", {"study": "one"}, "unknown key .did you mean 'fig2_area_and_gap'.*or a figure of your own"),
+        ("mine", entry | {"study": "two"}, "'two' is not defined"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            load({"figures": {name: given}})
