@@ -29,6 +29,7 @@ from icha.configuration.surfaces import AnySurface, MaterialSection
 from icha.contact.models import MODELS
 from icha.datasets.labels import is_derived_study
 from icha.path.targets import FORCE, INDENTATION, QUANTITIES
+from icha.support import formatting
 from icha.support.input_files import read_columns
 from icha.support.values import ROUNDING, Name, Problem, Section, Text, distinct
 
@@ -290,10 +291,8 @@ class Campaign(Section):
         for name, label in itertools.product(study.surfaces, study.materials):
             thickness, known = self.materials[label].thickness, self._grid_and_period(name)
             if thickness and self.is_free(name) and hasattr(known, "grid") and thickness < known.period / known.grid:
-                cell = f"{known.period / known.grid:.3g} m"
-                reason = (
-                    f"contains the layer {label!r} of {thickness:g} m, thinner than a grid cell of {name!r} ({cell})"
-                )
+                layer, cell = formatting.length(thickness), formatting.length(known.period / known.grid, 3)
+                reason = f"contains the layer {label!r} of {layer}, thinner than a grid cell of {name!r} ({cell})"
                 yield ("materials",), study.materials, f"{reason}; expected a thicker layer or a finer grid"
         for (index, label), name in itertools.product(enumerate(study.models), study.surfaces):
             surface, model = self.surfaces[name], MODELS[label]
@@ -325,9 +324,11 @@ class Campaign(Section):
             }[kind]
             a = float(contact_radius(value, radius, material.contact_modulus, material.surface_energy))
             if 2 * a > side:
-                reason = f"gives {label!r} on {name!r} a contact radius of about {a:.3g} m, but the square has "
-                reason += f"the side {side:.3g} m; expected a side of at least {3 * a:.2g} m, or smaller targets"
-                yield ("targets", QUANTITIES[kind].plural), value, reason
+                radius, given, least = (formatting.length(each, 3) for each in (a, side, 3 * a))
+                reason = f"gives {label!r} on {name!r} a contact radius of about {radius}, but the square has the side "
+                reason += f"{given}; expected a side of at least {least}, or smaller targets"
+                key = QUANTITIES[kind].plural
+                yield ("targets", key, len(getattr(study.targets, key)) - 1), value, reason
 
     def warnings(self) -> list[str]:
         """Return a warning for each random surface whose grid is valid but coarse."""

@@ -26,6 +26,7 @@ from icha.configuration.studies import PILOT, Study
 from icha.configuration.topographies import inspect_topographies
 from icha.configuration.yaml_files import (
     apply_defaults,
+    as_written,
     dump_yaml,
     excessive_size,
     location_in_defaults,
@@ -112,7 +113,7 @@ def _load(path: Path, origin: str, written: Mapping, within: str | os.PathLike |
     # Other unusual values are reported first, because they may cause the low U_full/dgamma.
     implausible = list(plausibility_problems(unusual, confirmed)) or plausibility_problems(sticky, confirmed)
     unusual += sticky
-    refuse(origin, itertools.chain(implausible, campaign.problems()))
+    refuse(origin, itertools.chain(implausible, _located(campaign.problems(), written)))
     reason = "is unusual{}, but confirmed; expected {}"
     accepted = [
         format_problem(origin, each.location, each.value, reason.format(each.source, each.usual)) for each in unusual
@@ -148,20 +149,24 @@ def _check_text(path: Path, origin: str, written: Mapping) -> Campaign:
     def implausible():
         return plausibility_problems(unusual_values(written), written.get(CONFIRMED))
 
-    def located(problems):
-        return ((location_in_defaults(location, written), value, reason) for location, value, reason in problems)
-
     content = apply_defaults(written)
     if excess := excessive_size(content):
         raise ConfigurationError(f"{origin}: {excess}; expected fewer")
     try:
         campaign = Campaign.model_validate(content)
     except ValidationError as error:
-        refuse(origin, located(map(problem_of, error.errors())), implausible())
+        refuse(origin, _located(map(problem_of, error.errors()), written), implausible())
     campaign, problems = expand_design(campaign.resolve_paths(path.parent), content)
-    refuse(origin, located(problems), implausible())
-    refuse(origin, located(itertools.chain(implausible(), campaign.problems())))
+    refuse(origin, _located(problems, written), implausible())
+    refuse(origin, itertools.chain(implausible(), _located(campaign.problems(), written)))
     return campaign
+
+
+def _located(problems, written):
+    """Yield problems with locations and quantities as in the file."""
+    for location, value, reason in problems:
+        place = location_in_defaults(location, written)
+        yield place, as_written(place, value, written), reason
 
 
 def _named_files(campaign: Campaign) -> dict[tuple[str, str], str]:

@@ -144,8 +144,9 @@ def unusual_heights(campaign: Campaign) -> Iterator[Unusual]:
             continue
         for contact in campaign.contacts(name):
             if not campaign.surfaces[contact.surface].smooth and not _SLOPE.contains(contact.rms_slope):
-                value, source = f"rms slope {contact.rms_slope:.3g}", f" on {contact.surface}"
-                yield Unusual(("studies", name, "rms_heights"), value, _SLOPE, source)
+                heights = ", ".join(map(formatting.length, study.rms_heights))
+                source = f" on {contact.surface}, where the rms slope is {contact.rms_slope:.3g}"
+                yield Unusual(("studies", name, "rms_heights"), heights, _SLOPE, source)
                 break
 
 

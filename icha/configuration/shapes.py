@@ -5,6 +5,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, model_validator
 
+from icha.support import formatting
 from icha.support.values import Length, Section, exactly_one, quantity
 from icha.surfaces.shapes import AMPLITUDE, HALF_ANGLE, Shape, make_shape
 
@@ -89,5 +90,6 @@ class ShapeSection(Section):
         except ValueError as error:
             return f"shape: {error}"
         if not np.isfinite(shape.heights(near, near)):
-            return f"shape: is smaller than a grid cell of {side / grid:.3g} m; expected a larger shape or a finer grid"
+            cell = formatting.length(side / grid, 3)
+            return f"shape: is smaller than a grid cell of {cell}; expected a larger shape or a finer grid"
         return None

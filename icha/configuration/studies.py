@@ -38,6 +38,7 @@ from icha.path.targets import (
     STEP,
     Path,
 )
+from icha.support.formatting import format_quantity, length
 from icha.support.rules import FORCES, NUMBER, PRESSURES, REFINEMENT, SLOPE, TOLERANCE, FloatRange
 from icha.support.values import (
     Force,
@@ -394,7 +395,7 @@ class Study(Section):
         alone, by_summits = self.models == [DEFAULT_MODEL], DEFAULT_MODEL in self.models
         # At a given load, the smallest slope has the largest reduced pressure. Smooth surfaces have the slope 0.
         slope = min((slope for slope in self.rms_slopes if not is_unread(slope) and slope > 0), default=math.inf)
-        units = {RELATIVE_LOAD: (slope, ""), NOMINAL_PRESSURE: (pressure_unit, " Pa"), FORCE: (force_unit, " N")}
+        units = {RELATIVE_LOAD: (slope, ""), NOMINAL_PRESSURE: (pressure_unit, "Pa"), FORCE: (force_unit, "N")}
         largest_radius = side * math.sqrt((MAX_AREA_FRACTION if by_summits else 1.0) / math.pi)
         for location, kind, value in self._states():
             # If a study has both models, asperity runs may end early at the limit of the asperity model. Therefore only
@@ -406,14 +407,15 @@ class Study(Section):
             most = MAX_REDUCED_PRESSURE if needed else LARGEST_REDUCED_PRESSURE
             if kind in units and value > most * units[kind][0]:
                 unit, symbol = units[kind]
-                expected = f"{QUANTITIES[kind].plural.replace('_', ' ')} up to {most * unit:g}{symbol}"
+                limit = format_quantity(most * unit, symbol) if symbol else f"{most * unit:g}"
+                expected = f"{QUANTITIES[kind].plural.replace('_', ' ')} up to {limit}"
                 if needed:
                     expected += f" (p* = {most:g}, the limit of the asperity model), or models: [boundary_elements]"
                 yield location, value, f"is a reduced pressure of {value / unit:.3g}; expected {expected}"
             if kind == CONTACT_RADIUS and value > largest_radius:
                 limit = f"A/A0 = {MAX_AREA_FRACTION:g}, the limit of the asperity model" if by_summits else "the square"
-                reason = f"is too large on a square of side {side:g} m"
-                yield location, value, f"{reason}; expected at most {largest_radius:g} m ({limit})"
+                reason = f"is too large on a square of side {length(side)}"
+                yield location, value, f"{reason}; expected at most {length(largest_radius, 4)} ({limit})"
         if self.unload or self.turning_points or self.control != "separation":
             yield from self._path_problems(snapshots)
 

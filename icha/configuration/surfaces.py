@@ -17,6 +17,7 @@ from pydantic import (
 
 from icha.asperity.material import VAN_DER_WAALS_RANGE
 from icha.configuration.shapes import ShapeSection
+from icha.support import formatting
 from icha.support.rules import GRID, HURST, LENGTH, POISSON_RATIO, FloatRange, IntegerRange
 from icha.support.values import (
     PATTERN,
@@ -113,10 +114,8 @@ class MaterialSection(Section):
     @model_validator(mode="after")
     def _check_layer(self):
         if self.thickness is not None and self.poisson_ratio is None:
-            raise ValueError(
-                f"poisson_ratio: the key is missing; a layer with thickness {self.thickness:g} m needs it; expected "
-                f"{POISSON_RATIO.expected}, such as 0.5 for rubber"
-            )
+            reason = f"the key is missing; a layer with thickness {formatting.length(self.thickness)} needs it"
+            raise ValueError(f"poisson_ratio: {reason}; expected {POISSON_RATIO.expected}, such as 0.5 for rubber")
         return self
 
 
@@ -383,11 +382,11 @@ class SelfAffineSurface(_Surface):
         period, rolloff, short = map(info.data.get, ("period", "rolloff_wavelength", "short_wavelength"))
         if info.field_name == "rolloff_wavelength":
             if period is not None and value > period * (1 + ROUNDING):
-                raise ValueError(f"is longer than the period; expected at most {period:g} m")
+                raise ValueError(f"is longer than the period; expected at most {formatting.length(period)}")
         elif info.field_name == "short_wavelength":
             if rolloff is not None and value >= rolloff * (1 - ROUNDING):
                 reason = "is not shorter than the roll-off wavelength"
-                raise ValueError(f"{reason}; expected less than {rolloff:g} m")
+                raise ValueError(f"{reason}; expected less than {formatting.length(rolloff)}")
         elif None not in (period, short) and value * short / period < 2 * (1 - ROUNDING):
             least = math.ceil(2 * period / short * (1 - ROUNDING))
             raise ValueError(

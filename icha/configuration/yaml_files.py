@@ -27,7 +27,7 @@ def read_yaml(path: Path) -> dict:
     except yaml.reader.ReaderError as error:
         line, problem = text.count("\n", 0, error.position) + 1, f"control character {error.character:#04x}"
     except yaml.MarkedYAMLError as error:
-        line, problem = error.problem_mark.line + 1, error.problem
+        line, problem = error.problem_mark.line + 1, _in_words(error)
     except RecursionError:
         problem = _TOO_DEEP
     if problem:
@@ -37,6 +37,22 @@ def read_yaml(path: Path) -> dict:
         what = "empty" if content is None else f"a {type(content).__name__}"
         raise ConfigurationError(f"{path}: the file is {what}; expected a YAML mapping of keys to values")
     return content
+
+
+# What a message of the YAML parser means; `{}` is the line where the text or the brackets begin.
+_MEANINGS = {
+    r"found character '\\t'": "a tab; YAML allows only spaces in front of a key",
+    r"expected ',' or '[]}]'": "a bracket from line {} is not closed, or a comma is missing",
+    "mapping values are not allowed": "a second colon; put text with a colon into quotes, and a key on its own line",
+    "unexpected end of stream": "the quotes from line {} are not closed",
+}
+
+
+def _in_words(error):
+    """Return the problem of a YAML error in words for authors of configurations."""
+    begin = (error.context_mark or error.problem_mark).line + 1
+    meanings = (words for pattern, words in _MEANINGS.items() if re.search(pattern, error.problem))
+    return next(meanings, error.problem).format(begin)
 
 
 def _read_text(path: Path) -> str:
@@ -174,6 +190,17 @@ def _fill_in(entry: Mapping, given: Mapping) -> dict:
     if kind and kind is not MeasuredSurface:
         others.add("boundary")
     return {key: value for key, value in given.items() if key not in others} | dict(entry)
+
+
+def as_written(location: tuple, value: Any, written: Mapping) -> Any:
+    """Return a quantity as written in the file, such as `50 kPa`, instead of its value in SI units."""
+    inside: Any = written
+    for key in location:
+        known = isinstance(inside, Mapping) and key in inside
+        if not known and not (isinstance(inside, list) and isinstance(key, int) and key < len(inside)):
+            return value
+        inside = inside[key]
+    return inside if isinstance(value, float) and isinstance(inside, str) else value
 
 
 def location_in_defaults(location: tuple, written: Mapping) -> tuple:

@@ -68,10 +68,10 @@ def _digits(value: float, digits: int) -> str:
     return f"{value:.0f}" if value >= 10.0**digits - 0.5 else f"{value:.{digits}g}"
 
 
-def length(metres: float) -> str:
+def length(metres: float, digits: int = 6) -> str:
     """Format a length in metres with a prefixed unit as in configurations, such as `2.5 um`."""
     factor, unit = choose_unit(metres, "m")
-    return f"{metres * factor:.6g} {unit.replace('µ', 'u')}"
+    return f"{metres * factor:.{digits}g} {unit.replace('µ', 'u')}"
 
 
 def printable(text: object) -> str:

@@ -86,7 +86,7 @@ def test_references_need_periodic_surfaces_and_half_spaces(refused):
         ({"surfaces.rough.shape": {"sphere": {"radius": "1 mm"}, "cone": {"half_angle": "80 deg"}}}, "given: cone, sp"),
         ({"surfaces.rough.shape": {"spheres": {"radius": "1 mm"}}}, "unknown key (did you mean 'sphere'?)"),
         ({"surfaces.rough.shape": {"cone": {"half_angle": "95 deg"}}}, "shape.cone.half_angle: '95 deg' is out of ra"),
-        ({"surfaces.rough.shape": {"cylinder_punch": {"radius": "0.1 um"}}}, "is smaller than a grid cell of 1.25e-0"),
+        ({"surfaces.rough.shape": {"cylinder_punch": {"radius": "0.1 um"}}}, "is smaller than a grid cell of 1.25 um"),
         ({"surfaces.ball": BALL | {"period": "1 mm"}}, "surfaces.ball.period: unknown key"),
     ],
 )
@@ -95,14 +95,14 @@ def test_wrong_shapes_are_refused(changes, message, refused):
 
 
 @pytest.mark.parametrize(
-    ("targets", "radius"), [({"forces": ["20 mN"]}, "5.51e-05"), ({"indentations": ["0 nm", "10 um"]}, "5.2e-05")]
+    ("targets", "radius"), [({"forces": ["20 mN"]}, "55.1"), ({"indentations": ["0 nm", "10 um"]}, "52")]
 )
 def test_contacts_larger_than_the_square_are_refused(targets, radius, refused):
     sphere = {"surfaces.rough.shape": {"sphere": {"radius": "0.25 mm"}}, "surfaces.rough.boundary": "free"}
     changes = sphere | {"studies.one.models": ["boundary_elements"], "studies.one.targets": targets}
     changes |= {"studies.one.snapshots": None}
     # JKR by hand: a^3 = 3 R/(4 E*) (F + 3 pi w R + ...), and the indentation a^2/R - sqrt(2 pi w a/E*) is 10.01 um.
-    refused("", changes, f"gives 'soft' on 'rough' a contact radius of about {radius} m, but the square has the side")
+    refused("", changes, f"gives 'soft' on 'rough' a contact radius of about {radius} um, but the square has the side")
 
 
 def test_an_unusual_youngs_modulus_is_refused(refused):

@@ -303,3 +303,22 @@ def _loaded_or_refused(file, text):
         plan(load_configuration(file).campaign, file.parent)
     except ConfigurationError as error:
         assert str(error).startswith(str(file)) and len(str(error)) < 200_000
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "line", "message"),
+    [
+        ("[0.2, 1.0]", "[0.2, 1.0", "rms_slopes", "a bracket from line {} is not closed, or a comma is missing"),
+        ("    rms_slopes", "\trms_slopes", "rms_slopes", "a tab; YAML allows only spaces in front of a key"),
+        ("name: demo", "name: demo: x", "name", "a second colon; put text with a colon into quotes"),
+        ("name: demo", 'name: "demo', "name", "the quotes from line {} are not closed"),
+    ],
+)
+def test_slips_in_yaml_are_explained(tmp_path, before, after, line, message):
+    file = tmp_path / "campaign.yaml"
+    text = yaml.safe_dump(yaml.safe_load(GOOD), sort_keys=False, default_flow_style=None)
+    assert text.count(before) >= 1
+    file.write_text(text.replace(before, after, 1))
+    number = next(k for k, each in enumerate(file.read_text().splitlines(), 1) if line in each)
+    with pytest.raises(ConfigurationError, match=re.escape(message.format(number))):
+        load_configuration(file)
