@@ -35,6 +35,13 @@ def column_name(name: str, unit: str) -> str:
     return name + _ENDINGS[unit]
 
 
+def name_and_unit(column: str) -> tuple[str, str]:
+    """Return name and unit of the variable in a column, the inverse of `column_name`."""
+    endings = sorted(_ENDINGS.items(), key=lambda each: -len(each[1]))
+    unit, ending = next(each for each in endings if column.endswith(each[1]))
+    return column.removesuffix(ending), unit
+
+
 def tidy_table(campaign: xr.DataTree) -> pd.DataFrame:
     """Return a table of all targets that the runs of a campaign reached.
 

@@ -11,6 +11,7 @@ import netCDF4
 import numpy as np
 
 from icha.datasets.results import LOOP, RUN, SOLUTION, SURFACE, THEORIES
+from icha.datasets.table import name_and_unit
 
 _COLUMNS = "file group variable dimensions type units long_name flags missing comment files".split()
 # Placeholders for the parts of a path that differ between files of one kind.
@@ -26,18 +27,26 @@ _KINDS = [
 def data_dictionary(folder: Path, files: Iterable[str]) -> str:
     """Return the text of `data_dictionary.csv`, with one row for each variable of each kind of file.
 
+    Columns of the table of all runs have the descriptions of the variables with the same names.
+
     Parameters
     ----------
     folder : folder of the files.
-    files : paths of the files, relative to `folder`; files that are not netCDF are left out.
+    files : paths of the files, relative to `folder`; other files than netCDF and the table are left out.
     """
     found: Counter[tuple[str, ...]] = Counter()
-    for name in sorted(files):
+    long_names: dict[str, str] = {}
+    for name in sorted(files, key=lambda each: (not each.endswith(".nc"), each)):
         if name.endswith(".nc"):
             with netCDF4.Dataset(folder / name) as file:
                 for group in (file, *file.groups.values()):
                     for variable in group.variables.values():
                         found[file_pattern(name), group.path, *_described(variable)] += 1
+                        long_names[variable.name] = getattr(variable, "long_name", "")
+        elif name.startswith("dataset/") and name.endswith(".csv"):
+            for column in (folder / name).open(encoding="utf-8").readline().strip().split(","):
+                variable, unit = name_and_unit(column)
+                found[name, "", column, "row", "", unit, long_names.get(variable, variable), "", "empty", ""] += 1
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows([_COLUMNS, *((*row, count) for row, count in found.items())])
     return text.getvalue()

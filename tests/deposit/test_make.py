@@ -168,6 +168,11 @@ def test_the_dictionary_has_every_variable_and_no_other(published):
             with netCDF4.Dataset(published / path) as data:
                 for group in (data, *data.groups.values()):
                     counts.update((file_pattern(path), group.path, name) for name in group.variables)
+    table = "dataset/tiny.csv"
+    columns = (published / table).read_text(encoding="utf-8").partition("\n")[0].split(",")
+    counts.update((table, "", column) for column in columns)
+    gap = rows[table, "", "mean_gap_m"]
+    assert gap["units"] == "m" and gap["long_name"].startswith("mean of the gap over the nominal area")
     assert {key: int(row["files"]) for key, row in rows.items()} == counts
     assert all(row["units"] and row["long_name"] for row in rows.values())
     run = file_pattern(f"runs/{RUN}.nc"), "/"
