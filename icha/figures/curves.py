@@ -275,7 +275,7 @@ def add_legend(figure: Figure, panels: Sequence[Axes], curves: Curves) -> None:
     """Add a legend of the curves, and of everything that has a label in the panels."""
     seeds = lines_handles(len(line.runs.by_seed) for line in curves.lines)
     handles = curves.handles | seeds | named_handles(panels)
-    legend_below(figure, handles)
+    legend_below(figure, handles, rows=curves.looks.slopes_per_surface)
 
 
 def drop_rounding_errors(values: np.ndarray) -> np.ndarray:

@@ -74,7 +74,8 @@ def draw_errors(
     for ax in panels[-1]:
         ax.set(xlabel=PRESSURE_LABEL, ylim=(None if percent else 0, None))
     named.pop("", None)
-    legend_below(fig, (looks.handles() if looks.many else named) | points_handles(counts))
+    named = looks.handles() if looks.many else named
+    legend_below(fig, named | points_handles(counts), rows=looks.slopes_per_surface)
     return fig
 
 

@@ -76,7 +76,7 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
     name_models(loss, itertools.chain(*runs.values()))
     shown = _draw_parts(parts, sticky, looks)
     handles |= {PARTS[name][0]: Patch(ec="black", lw=0.5, **PARTS[name][1]) for name in shown}
-    legend_below(fig, handles | points_handles(counts), looks.heading())
+    legend_below(fig, handles | points_handles(counts), looks.heading(), rows=looks.slopes_per_surface)
     return fig
 
 

@@ -158,6 +158,14 @@ class Looks:
         """Return the heading of a legend: the only material, if colours distinguish surfaces and slopes."""
         return self.material_name(self.materials[0]) if self.by_place and len(self.materials) == 1 else None
 
+    @property
+    def slopes_per_surface(self) -> int | None:
+        """Number of slopes of each of several surfaces that colours distinguish; None if there are no such surfaces."""
+        surfaces = [surface for surface, _ in self.places]
+        count = surfaces.count(surfaces[0])
+        alike = all(surfaces.count(surface) == count for surface in surfaces)
+        return count if self.by_place and alike and 1 < count < len(surfaces) else None
+
     def colour_handles(self) -> dict[str, Line2D]:
         """Return legend entries that show only colours: bars of some materials, or of some surfaces and slopes."""
         named, coloured = (self.place_name, self.places) if self.by_place else (self.material_name, self.materials)
@@ -294,16 +302,23 @@ _MANY_NAMES = 12
 _MOST_COLUMNS = 4
 
 
-def legend_below(figure: Figure, handles: Mapping[str, object], heading: str | None = None) -> None:
+def legend_below(
+    figure: Figure, handles: Mapping[str, object], heading: str | None = None, *, rows: int | None = None
+) -> None:
     """Add a legend below the panels, with an entry for each handle, in as many columns as fit, and with a heading.
 
-    The legend increases the height of the figure, and must therefore be added last.
+    If `rows` is given, columns have this number of rows if they fit. The legend increases the height of the figure, and
+    must therefore be added last.
     """
     marks = named_handles(figure.axes)
     handles = dict(handles) | {name: marks[name] for name in (FEWER_SEEDS, NOT_APPLICABLE) if name in marks}
     look = {"loc": "outside lower center", "fontsize": 8 if len(handles) <= _MANY_NAMES else 7}
-    for columns in range(_MOST_COLUMNS if handles else 0, 0, -1):
-        legend = figure.legend(handles.values(), handles.keys(), ncols=columns, title=heading, **look)
+    most, names, entries = _MOST_COLUMNS if handles else 0, list(handles), list(handles.values())
+    if rows and (needed := -(-len(names) // rows)) <= _MOST_COLUMNS:
+        most, empty = needed, needed * rows - len(names)
+        names, entries = names + [""] * empty, entries + [legend_handle(ls="none")] * empty
+    for columns in range(most, 0, -1):
+        legend = figure.legend(entries, names, ncols=columns, title=heading, **look)
         size = legend.get_window_extent().size / figure.dpi
         if size[0] < figure.get_figwidth() or columns == 1:
             figure.set_figheight(figure.get_figheight() + size[1])

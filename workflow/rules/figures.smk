@@ -38,7 +38,9 @@ rule figure:
     conda:
         "../envs/icha.yaml"
     resources:
-        mem_mb=lambda wildcards: figure_memory(CAMPAIGN, holds_topography=declaration_of(wildcards.name).holds_topography),
+        mem_mb=lambda wildcards: figure_memory(
+            CAMPAIGN, holds_topography=declaration_of(wildcards.name).holds_topography
+        ),
         runtime=10,
     params:
         arguments=lambda wildcards: FIGURES[wildcards.name].arguments(CAMPAIGN),
