@@ -14,10 +14,10 @@ FIGURE_INPUTS = {
 }
 
 
-def given_files(name):
-    """Return the paths of the user's files that a figure needs."""
-    inputs = FIGURE_INPUTS[name]
-    return [*inputs.get("tables", ()), *([inputs["script"]] if "script" in inputs else [])]
+# Files of the user that a figure needs: tables of measurements, and the script of an own figure.
+GIVEN_FILES = {
+    name: [*inputs.get("tables", ()), *filter(None, [inputs.get("script")])] for name, inputs in FIGURE_INPUTS.items()
+}
 
 
 wildcard_constraints:
@@ -45,8 +45,8 @@ rule figure:
     params:
         arguments=lambda wildcards: FIGURES[wildcards.name].arguments(CAMPAIGN),
         studies=lambda wildcards: FIGURES[wildcards.name].studies_of(CAMPAIGN),
-        # Tables of measurements and scripts of own figures are compared by content, not by time.
-        sha256=lambda wildcards: [sha256_of(Path(file)) for file in given_files(wildcards.name)],
+        # These files are compared by content, not by time.
+        sha256=lambda wildcards: [sha256_of(Path(file)) for file in GIVEN_FILES[wildcards.name]],
         code=lambda wildcards: code_of("draw_figure.py", module_name(wildcards.name)),
     message:
         "Figure {wildcards.name}"
