@@ -42,19 +42,19 @@ def caption_of(name: str, shown: str) -> str:
 def texts_of(figure: Figure, data: Mapping[str, object], studies: Sequence[str]) -> str:
     """Return all texts of a figure, and words for what no text of a figure tells, as lines.
 
-    Words are the names of the `data`; `inset`; and words for the `studies` that are shown: `bare` and `adhesive`
-    materials, `several surfaces`, `several slopes`, `periodic` surfaces, and boundary elements that the model was
-    compared with, `in the limit` or `at finite range`.
+    Words are the names of the `data`, and words for the `studies` that are shown: materials that are `bare`, `adhesive`
+    or both, `several surfaces`, `several slopes`, `periodic` surfaces, and boundary elements that the model was compared
+    with, `in the limit` or `at finite range`.
     """
     from matplotlib.text import Text
 
     words = [*data, *(text.get_text() for text in figure.findobj(Text))]
-    words += ["inset"] if any(axes.child_axes for axes in figure.axes) else []
     campaign = data["campaign"].children if "campaign" in data else {}
     for study in (campaign[name].to_dataset() for name in studies if name in campaign):
         conditions = {
             "bare": (study["surface_energy"] == 0).any(),
             "adhesive": (study["surface_energy"] > 0).any(),
+            "with and without adhesion": (study["surface_energy"] == 0).any() and (study["surface_energy"] > 0).any(),
             "several surfaces": study.sizes["surface"] > 1,
             "several slopes": len(slopes_of(study)) > 1,
             "periodic": (study["boundary"] == "periodic").any(),

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
 PRESSURE_LABEL = r"reduced pressure  $F/(E^{\ast}h′_{\mathrm{rms}}A_0)$"
 AREA_LABEL = r"contact area  $A/A_0$"
+RATIO_LABEL = r"contact area over load  $AE^{\ast}h′_{\mathrm{rms}}/F$"
 SEPARATION_LABEL = r"mean separation  $\bar{u}/h_{\mathrm{rms}}$"
 GAP_LABEL = r"mean gap  $\langle u\rangle/h_{\mathrm{rms}}$"
 
@@ -102,7 +103,7 @@ def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | Non
     changed |= {"ls": "-" if looks.many or any(len(group.by_seed) > 1 for group in groups) else "none"}
     if len(looks.materials if looks.by_place else looks.places) == 1:
         changed |= {} if looks.by_place else {"marker": MODEL_MARKERS[name]}
-        handles = looks.handles(**changed) | {name: model_handle(name, mfc="white")}
+        handles = looks.handles(**changed) | {name: model_handle(name, **looks.fill())}
         handles |= {SHORT_RANGE: model_handle(SHORT_RANGE)} if crosses else {}
     else:
         # A shape shows the model and, for example, the slope. Colours therefore have legend entries without a shape.
@@ -156,7 +157,7 @@ def add_snapshot_legend(
     state = select.snapshot_label(*lines[-1].members[0])
     panels[0].set_title(state if len(panels) > 1 else ", ".join(filter(None, (place, state))), loc="right")
     handles = looks.handles(ls="-", marker=MODEL_MARKERS[model])
-    handles |= {model: model_handle(model, ls="-", lw=0.8, mfc="white")}
+    handles |= {model: model_handle(model, ls="-", lw=0.8, **looks.fill())}
     if any(line.truths for line in lines):
         handles[SHORT_RANGE] = model_handle(SHORT_RANGE, **TRUTH_LINE)
     handles |= lines_handles(len(line.members) for line in lines) | named_handles(panels[1:])
@@ -172,9 +173,30 @@ def area_points(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     return run["reduced_pressure"].values, run["contact_area_fraction"].values
 
 
+def ratio_points(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+    """Return reduced pressures of the steps with positive load, and contact area fractions divided by them."""
+    pressure, area = area_points(run)
+    pressed = pressure > 0
+    return pressure[pressed], area[pressed] / pressure[pressed]
+
+
 def gap_points(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     """Return reduced pressures and reduced separations of the steps of a run."""
     return run["reduced_pressure"].values, run["reduced_separation"].values
+
+
+def limit_ratios(axes: Axes, ratios: np.ndarray) -> None:
+    """Set the limits of an axis of area over load; the axis is logarithmic if the ratios span more than `_SPAN`."""
+    low, high = ratios.min(), ratios.max()
+    if high > _SPAN * low:
+        axes.set_ylim(0.7 * low, 1.4 * high)
+    else:
+        axes.set_yscale("linear")
+        axes.set_ylim(low - 0.25 * (high - low), high + 0.15 * (high - low))
+
+
+# Largest ratio of the ends of a linear axis of area over load.
+_SPAN = 5.0
 
 
 class Axis(NamedTuple):

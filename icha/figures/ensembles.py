@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from matplotlib.lines import Line2D
 
 # Largest number of curves whose single seeds are drawn; with more curves, only the means could be told apart.
-MOST_SCATTERED = 8
+MOST_SCATTERED = 4
 # Approximate number of markers on the line of a mean.
-_MEAN_MARKERS = 8
+_MEAN_MARKERS = 24
 _SEED_LINE = {"ls": "-", "lw": 0.5, "alpha": 0.5, "zorder": 1.6}
 _SEED_DOT = {"ls": "none", "marker": ".", "ms": 5, "mew": 0, "alpha": 0.5, "zorder": 2.5}
 _CROSS = {"ls": "none", "marker": "x", "mew": 0.7, "label": FEWER_SEEDS}
@@ -133,7 +133,7 @@ def join_bins(edges: np.ndarray, contents: np.ndarray, least: float) -> tuple[np
 def draw_points(
     axes: Axes, x: np.ndarray, members: np.ndarray, look: dict, *, positive: bool, asked: int | np.ndarray = 0
 ) -> ErrorbarContainer:
-    """Draw the means of an ensemble as points with confidence bars; draw few members as dots without bars.
+    """Draw the means of an ensemble as points with confidence bars, or for few members with bars of their range.
 
     A line joins two neighbouring points only if both points are means over the same members.
 
@@ -146,14 +146,13 @@ def draw_points(
     """
     known, over = np.isfinite(members), ensemble(members)
     x = np.where(known, x, np.nan)
-    few, enough = (over.count > 1) & (over.count < ENOUGH), over.count >= ENOUGH
+    several, few = over.count > 1, (over.count > 1) & (over.count < ENOUGH)
+    ends = np.array(over.band(positive=positive))
     if few.any():
-        dots = (np.where(few, values, np.nan).ravel() for values in (x, members))
-        axes.plot(*dots, color=look["color"], **_SEED_DOT)
-    low, high = over.band(positive=positive)
-    x, bars = ensemble(x).mean, np.where(enough, [over.mean - low, high - over.mean], np.nan)
+        ends[:, few] = np.nanmin(members[:, few], axis=0), np.nanmax(members[:, few], axis=0)
+    x, bars = ensemble(x).mean, np.where(several, [over.mean - ends[0], ends[1] - over.mean], np.nan)
     *points, below, above = _break_lines(known, x, over.mean, *bars)
-    bars = {"yerr": [below, above] if enough.any() else None, "elinewidth": 0.6, "capsize": 1.5}
+    bars = {"yerr": [below, above] if several.any() else None, "elinewidth": 0.6, "capsize": 1.5}
     handle = axes.errorbar(*points, **bars | look)
     mark_fewer(axes, x, over.mean, known, look, asked)
     return handle
@@ -217,7 +216,7 @@ def lines_handles(counts: Iterable[int]) -> dict[str, Line2D]:
 def points_handles(counts: Iterable[int]) -> dict[str, Line2D]:
     """Return the legend entries of points that are means over `counts` seeds."""
     bars = {"marker": "|", "ls": "none", "ms": 8}
-    return _handles(counts, {"means, bars 95 %": bars, "single seeds beside their mean": _SEED_DOT})
+    return _handles(counts, {"means, bars 95 %": bars, "means, bars from least to largest": bars})
 
 
 def _handles(counts, looks):

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 # All materials share a panel if each material has at most this number of lines.
 _MOST_LINES = 2
 # Points at the same load are drawn side by side. The positions of two neighbours on the load axis have this ratio.
-_APART = 1.025
+_APART = 1.045
 # The load axis extends beyond all loads by the factor _MARGIN. The end of the axis is at least _LEAST_REACH times the
 # middle of the axis, which leaves room for a tick label.
 _MARGIN, _LEAST_REACH = 1.2, 1.6
@@ -53,6 +53,8 @@ def draw_errors(
     counts: set[int] = set()
     for row, shown in zip(panels, rows, strict=True):
         drawn = [(*of, k, entries) for of, entries in curves.items() if of[0][0] in shown for k in range(len(entries))]
+        if own_rows and not looks.adhesive(shown[0]):
+            drawn = _different(drawn, list(labels))
         for position, (contact, applicable, k, entries) in enumerate(drawn):
             look = looks.look(contact, applicable=applicable) | {"ls": DASHES[k % len(DASHES)]}
             loads = entries[k]["reduced_pressure"].values * _APART ** (position - (len(drawn) - 1) / 2)
@@ -63,8 +65,8 @@ def draw_errors(
                 counts.update(np.isfinite(members).sum(axis=0).tolist())
             if applicable:
                 named.setdefault(_name(looks, contact, entries, k, own_rows=own_rows), handle)
-        if own_rows:
-            row[-1].set_title(material_label(interfaces, shown[0]), loc="right")
+        for ax in row if own_rows else ():
+            ax.set_title(material_label(interfaces, shown[0]), loc="right", fontsize=8)
     low, high = panels[0, 0].dataLim.intervalx
     middle, reach = np.sqrt(low * high), max(_MARGIN * np.sqrt(high / low), _LEAST_REACH)
     for ax, label in zip(panels.ravel(), itertools.cycle(labels.values()), strict=False):
@@ -74,9 +76,22 @@ def draw_errors(
     for ax in panels[-1]:
         ax.set(xlabel=PRESSURE_LABEL, ylim=(None if percent else 0, None))
     named.pop("", None)
-    named = looks.handles() if looks.many else named
+    named = looks.colour_handles() if own_rows else looks.handles() if looks.many else named
     legend_below(fig, named | points_handles(counts), rows=looks.slopes_per_surface)
     return fig
+
+
+def _different(drawn, names):
+    """Leave out errors without adhesion that equal those of the same surface at another slope."""
+    found = {}
+    for contact, applicable, k, entries in drawn:
+        values = np.concatenate([entries[k][name].values.ravel() for name in names])
+        alike = found.setdefault((contact[1], applicable), [])
+        if not any(
+            each.shape == values.shape and np.allclose(each, values, rtol=1e-2, equal_nan=True) for each, _ in alike
+        ):
+            alike.append((values, (contact, applicable, k, entries)))
+    return [curve for alike in found.values() for _, curve in alike]
 
 
 def _curves(model_error, study, names) -> dict[tuple[Contact, bool], list[xr.Dataset]]:

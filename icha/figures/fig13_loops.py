@@ -60,9 +60,9 @@ DECLARATION = Declaration(
 
 # All slopes share a panel if there are at most this number of loops.
 _MOST_LOOPS = 4
-# An inset enlarges the tension if the largest tension is smaller than the largest pressure times this factor.
+# A panel enlarges the tension if the largest tension is smaller than the largest pressure times this factor.
 _SMALL_TENSION = 0.25
-# Largest pressure in the inset, divided by the largest tension.
+# Largest pressure in this panel, divided by the largest tension.
 _REACH = 1.4
 # Distance between the markers of boundary elements, divided by the diagonal of the panel.
 _APART = 0.025
@@ -113,6 +113,8 @@ def figure(
     surface, seed : labels of the topography. Default: surface and seed of the first complete run.
     units : "reduced" or "physical".
     """
+    from matplotlib.ticker import MaxNLocator
+
     from icha.analysis.model_error import difference_of_contacts
 
     runs = select.select_by_labels(select.select_unloaded_runs(campaign, study), surface=surface, seed=seed)
@@ -139,22 +141,32 @@ def figure(
         drawn.append(_Loop(labels.rms_slope, run, beside, look))
 
     rows = [[slope] for slope in slopes] if own_rows else [slopes]
-    fig, panels = new_panels(2.7 * len(rows), len(rows))
-    for (left, right), shown in zip(panels, rows, strict=True):
-        shown_loops = [loop for loop in drawn if loop.rms_slope in shown]
+    by_row = [[loop for loop in drawn if loop.rms_slope in shown] for shown in rows]
+    windows = [_small_tensions(loops_of_row) for loops_of_row in by_row]
+    columns = 3 if any(windows) else 2
+    fig, panels = new_panels(2.7 * len(rows), len(rows), columns)
+    for (left, *middle, right), shown_loops, window in zip(panels, by_row, windows, strict=True):
         for loop in shown_loops:
-            for ax, names in ((left, _LOADS), (right, _AREAS)):
+            for ax, names in ((left, _LOADS), *((ax, _LOADS) for ax in middle), (right, _AREAS)):
                 _draw(ax, loop, names, turn=len(slopes) > 1)
-        _enlarge(left, shown_loops)
+        for ax in middle:
+            ax.axhline(0, color=GREY, lw=0.5, zorder=1)
+            ax.ticklabel_format(style="sci", scilimits=(-2, 3), useMathText=True)
+            ax.xaxis.set_major_locator(MaxNLocator(4))
+            ax.yaxis.set_offset_position("right")
+            ax.text(0.95, 0.9, "near zero load", transform=ax.transAxes, ha="right", fontsize=8)
+            if window:
+                ax.set(xlim=window[0], ylim=window[1])
         left.set_ylabel(pressure.label)
         right.set_ylabel(AREA_LABEL)
         if own_rows:
-            right.set_title(slope_label(shown[0]), loc="right")
-    panels[-1, 0].set_xlabel(gap.label)
-    panels[-1, 1].set_xlabel(pressure.label)
+            right.set_title(slope_label(shown_loops[0].rms_slope), loc="right")
+    for ax in panels[-1, :-1]:
+        ax.set_xlabel(gap.label)
+    panels[-1, -1].set_xlabel(pressure.label)
     labels, _ = runs[0]
     words = MODELS[labels.model].words, surface_label(campaign, labels.surface), f"seed {labels.seed}"
-    panels[0, 0].set_title(", ".join(words), loc="right")
+    fig.suptitle(", ".join(words), fontsize="medium")
     legend_below(fig, _handles(looks, drawn, marked=len(rows[0]) > 1), looks.heading())
     return fig
 
@@ -181,27 +193,21 @@ def _draw(ax, loop, names, *, turn):
             ax.plot(*(states[name] for name in names), color=colour, marker=marker, markevery=_APART, **_TRUTH)
 
 
-def _enlarge(ax, loops):
-    """Add an inset that enlarges the region around zero load, if the tension is small but not zero."""
-    from matplotlib.ticker import MaxNLocator
-
-    separations, pressures, areas = (
-        np.concatenate([loop.run[name].values for loop in loops]) for name in (*_LOADS, "contact_area_fraction")
-    )
+def _small_tensions(loops):
+    """Return the limits of separation and load around zero load, if the tension is small but not zero; else None."""
+    pressures = np.concatenate([loop.run["load"].values for loop in loops])
     tension = -pressures.min()
     if not select.ROUNDING * pressures.max() < tension < _SMALL_TENSION * pressures.max():
-        return
-    shown = separations[(np.abs(pressures) <= _REACH * tension) & (areas > 0)]
+        return None
+    shown = []
+    for run in (loop.run for loop in loops):
+        near = (np.abs(run["load"].values) <= _REACH * tension) & (run["contact_area_fraction"].values > 0)
+        at = np.flatnonzero(near)
+        # The first state after separation is shown as well.
+        shown.append(run["separation"].values[np.unique([*at, min(at[-1] + 1, len(near) - 1)])] if at.size else [])
+    shown = np.concatenate(shown)
     room = 0.06 * np.ptp(shown)
-    inset = ax.inset_axes((0.5, 0.42, 0.45, 0.44))
-    for loop in loops:
-        _draw(inset, loop, _LOADS, turn=False)
-    inset.set(xlim=(shown.min() - room, shown.max() + room), ylim=(-_REACH * tension, _REACH * tension))
-    inset.axhline(0, color=GREY, lw=0.5, zorder=1)
-    inset.tick_params(labelsize=6.5, pad=2)
-    inset.ticklabel_format(style="sci", scilimits=(-2, 3), useMathText=True)
-    inset.yaxis.get_offset_text().set_fontsize(6.5)
-    inset.xaxis.set_major_locator(MaxNLocator(4))
+    return (shown.min() - room, shown.max() + room), (-_REACH * tension, _REACH * tension)
 
 
 def _handles(looks, loops, *, marked):

@@ -13,7 +13,7 @@ from icha.datasets.labels import RunLabels
 from icha.figures.declaration import Campaign, Declaration, Inputs, RunFigure
 from icha.figures.looks import run_label
 from icha.figures.maps import average_blocks
-from icha.figures.style import in_style, new_panels
+from icha.figures.style import format_number, in_style, new_panels
 from icha.support.formatting import choose_unit, format_quantity
 from icha.support.values import Problem
 
@@ -84,7 +84,11 @@ def figure(campaign: xr.DataTree, maps: xr.Dataset, *, run: Sequence) -> Figure:
     pressure = maps["contact_pressure"].transpose("snapshot", "row", "column").values
     inside = np.abs(pressure[touching])
     factor, unit = choose_unit(float(np.quantile(inside, _COVERED)), "Pa")
-    most = float(np.quantile(inside, _COVERED)) * factor
+    # Tension has a scale of its own, because it is often smaller than the pressure.
+    most, least = (
+        factor * float(np.quantile(np.abs(part), _COVERED)) if part.size else factor * float(inside.max())
+        for part in (pressure[touching & (pressure > 0)], pressure[touching & (pressure < 0)])
+    )
     length, length_unit = choose_unit(float(maps["period"]), "m")
     side = float(maps["period"]) * length
     columns = min(len(shown), _COLUMNS)
@@ -100,16 +104,21 @@ def figure(campaign: xr.DataTree, maps: xr.Dataset, *, run: Sequence) -> Figure:
             origin="lower",
             interpolation="nearest",
             cmap="RdBu_r",
-            norm=TwoSlopeNorm(0, -most, most),
+            norm=TwoSlopeNorm(0, -least, most),
         )
         ax.set_title(_name_state(maps, k), loc="right", fontsize=8)
         ax.set(xlim=np.array(window) * side, ylim=np.array(window) * side)
-        ax.set(xlabel=f"x ({length_unit})", ylabel=f"y ({length_unit})", facecolor="0.93")
+        ax.set(xlabel=f"x ({length_unit})", ylabel=f"y ({length_unit})", facecolor="0.8")
         ax.label_outer()
     for ax in panels.ravel()[len(shown) :]:
         ax.remove()
+    for ax in panels.ravel()[len(shown) - columns : (rows - 1) * columns]:
+        ax.tick_params(labelbottom=True)
+        ax.set_xlabel(f"x ({length_unit})")
     bar = fig.colorbar(image, ax=panels.ravel()[: len(shown)], shrink=0.9, pad=0.015, aspect=28, extend="both")
     bar.set_label(f"pressure ({unit})")
+    ends = (-least, -least / 2, 0, most / 2, most)
+    bar.set_ticks(ends, labels=[f"{float(f'{value:.2g}'):g}" for value in ends])
     fig.suptitle(run_label(campaign, labels), fontsize="medium")
     return fig
 
@@ -124,10 +133,12 @@ def _window(touched, free):
 
 
 def _name_state(maps, snapshot):
-    """Return branch and load of a snapshot as text; for a free square, the load is the force."""
+    """Return load and area of a snapshot as text, with the branch if it is not loading; on a free square, the force."""
     step = int(maps["snapshot_step"].values[snapshot])
     pull_off = str(maps["snapshot_kind"].values[snapshot]) == "pull_off"
     name = "pull-off" if pull_off else str(maps["branch"].values[step])
     if "force" in maps:
         return f"{name}, $F$ = {format_quantity(float(f'{float(maps.force[step]):.3g}'), 'N')}"
-    return f"{name}, $A/A_0$ = {float(maps['contact_area_fraction'][step]):.3g}"
+    load = format_number(float(f"{float(maps['reduced_pressure'][step]):.3g}"))
+    words = rf"$p^{{\ast}}$ = {load}, $A/A_0$ = {float(maps['contact_area_fraction'][step]):.2g}"
+    return words if name == "loading" else f"{name}, {words}"

@@ -89,15 +89,16 @@ def figure(
     compared = [(line, truths[line.runs.contact]) for line in shown.lines if line.runs.contact in truths]
     fig, axes = new_panels(4.5, 2, sharex=True, height_ratios=(1, _LOWER)) if compared else new_panels(3.3)
     left, right = axes[0]
-    panels = {left: curves.area_points, right: curves.gap_points}
-    (pressures, areas), (_, gaps) = (
+    panels = {left: curves.ratio_points, right: curves.gap_points}
+    (pressures, ratios), (_, gaps) = (
         map(curves.drop_rounding_errors, drawn) for drawn in curves.draw_curves(shown, panels, unloading=True)
     )
     x = (pressures.min() / 1.6, pressures.max() * 1.6)
+    curves.limit_ratios(left, ratios)
     if references is not None:
         _draw_references(left, right, references, x)
         _draw_separate_summits(left, right, references, dataset, shown.looks)
-    left.set(ylabel=curves.AREA_LABEL, ylim=(min(areas.min(), 1.6 * x[0]) / 1.5, min(1.3, 3 * areas.max())))
+    left.set_ylabel(curves.RATIO_LABEL)
     low, high = gaps.min() / 1.4, gaps.max() * 1.4
     right.set(ylabel=curves.gap_label(dataset), ylim=(low, high))
     right.yaxis.set_major_formatter("{x:g}")
@@ -198,17 +199,21 @@ def _draw_references(left, right, references, limits):
     """Draw published results and theories of rough contact; `limits` are the smallest and the largest load."""
     p, black = references["reduced_pressure"].values, {"color": BLACK, "lw": 1, "zorder": 2}
     shown = (p >= limits[0] / 1.5) & (p <= limits[1] * 1.5)
-    left.plot(p[shown], references["persson_area_fraction"].values[shown], label="Persson", **black)
+    left.plot(p[shown], references["persson_area_fraction"].values[shown] / p[shown], label="Persson", **black)
     corrected = references["xu_area_fraction"].values[shown]
-    left.plot(p[shown], corrected, label="Persson, corrected by Xu et al.", **black | {"ls": (0, (1, 1))})
+    left.plot(p[shown], corrected / p[shown], label="Persson, corrected by Xu et al.", **black | {"ls": (0, (1, 1))})
     linear = references["linear_pressure"].values
     touching = linear >= limits[0] / 1.5
     area = references["bush_gibson_thomas_area_fraction"].values[touching]
-    left.plot(linear[touching], area, label="Bush, Gibson & Thomas", **black | {"ls": "--", "color": GREY})
+    left.plot(
+        linear[touching], area / linear[touching], label="Bush, Gibson & Thomas", **black | {"ls": "--", "color": GREY}
+    )
     if "gfmd_reduced_pressure" in references:
-        gfmd = references[["gfmd_reduced_pressure", "gfmd_area_fraction", "gfmd_area_scatter"]].values()
+        load, area, scatter = (
+            references[f"gfmd_{n}"].values for n in ("reduced_pressure", "area_fraction", "area_scatter")
+        )
         points = {"fmt": "x", "color": BLACK, "ms": 6, "mew": 1.2, "lw": 1.2, "zorder": 5}
-        left.errorbar(*(values.values for values in gfmd), label="GFMD, no adhesion", **points)
+        left.errorbar(load, area / load, scatter / load, label="GFMD, no adhesion", **points)
     if "persson_reduced_separation" in references:
         right.plot(
             p[shown],
@@ -272,7 +277,8 @@ def _draw_separate_summits(left, right, references, dataset, looks):
             theories.append(("Fuller & Tabor", (0, (1, 1.5)), looks.material_colour(material), "fuller_tabor", theory))
     for label, dashes, colour, name, theory in theories:
         p, separation = (theory[f"{name}_reduced_{quantity}"].values for quantity in ("pressure", "separation"))
-        look = {"ls": dashes, "lw": 0.8, "zorder": 1.8}
-        for ax, values in ((left, theory["summit_area_fraction"].values), (right, separation)):
-            ax.plot(p[p > 0], values[p > 0], color=colour, **look)
-            ax.plot([], [], color=GREY, label=label, **look)
+        look, pressed = {"ls": dashes, "lw": 0.8, "zorder": 1.8}, p > 0
+        area = theory["summit_area_fraction"].values[pressed] / p[pressed]
+        for ax, values in ((left, area), (right, separation[pressed])):
+            ax.plot(p[pressed], values, color=colour, **look)
+            ax.plot([], [], color=colour if len(theories) <= 2 else GREY, label=label, **look)

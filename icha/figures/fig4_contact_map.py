@@ -15,7 +15,7 @@ from icha.figures.declaration import Campaign, Declaration, Inputs, RunFigure, S
 from icha.figures.looks import NOT_APPLICABLE_ALONE, run_label
 from icha.figures.maps import draw_map, draw_spots, topography_of, wrap_circles
 from icha.figures.select import is_applicable, select_complete_run
-from icha.figures.style import format_number, in_style, legend_handle, new_panels
+from icha.figures.style import BLUE, format_number, in_style, legend_handle, new_panels
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -93,7 +93,7 @@ def figure(
     draw_spots(whole, circles, facecolor=(*_RED, 0.85), lw=0, rasterized=len(circles) > _MANY_SPOTS)
     nodes, borders = _window(topography.heights, topography.side, corner, width)
     enlarged.imshow(nodes * topography.scale, extent=borders, origin="lower", interpolation="nearest", **heights)
-    draw_spots(enlarged, circles, facecolor=(*_RED, 0.4), edgecolor=(0.75, 0, 0), lw=1.0)
+    draw_spots(enlarged, circles, facecolor=(*_RED, 0.4), edgecolor=_RED, lw=1.0)
     area = rf"$A/A_0$ = {float(state['contact_area_fraction']):.3f}"
     whole.set_title(area if beside is None else f"asperities, {area}", loc="right")
     enlarged.set_title(f"enlarged ×{topography.side / width:.0f}", loc="right")
@@ -106,7 +106,7 @@ def figure(
     for ax in panels.ravel():
         topography.label(ax)
         if ax is not enlarged:
-            frame = "white" if ax.get_images()[0].get_array().ndim == 2 else "black"
+            frame = "white" if ax.get_images()[0].get_array().ndim == 2 else BLUE
             ax.add_patch(Rectangle(corner, width, width, fill=False, ec=frame, lw=1.2))
     enlarged.set(xlim=corner[0] + np.array([0, width]), ylim=corner[1] + np.array([0, width]))
     bar = fig.colorbar(image, ax=panels, shrink=0.92 if beside is None else 0.46, pad=0.015, aspect=28)
@@ -144,13 +144,13 @@ def _draw_boundary_elements(panels, topography, window, heights, beside, covered
     fraction = beside["contact_map"].transpose("row", "column").values.astype(float)
     contact = fraction >= 0.5
     topography.draw(solution, **heights)
-    red = LinearSegmentedColormap.from_list("contact", [(*_RED, 0.0), (*_RED, 0.9)])
-    draw_map(solution, fraction, topography.side, cmap=red, vmin=0, vmax=1)
+    black = LinearSegmentedColormap.from_list("contact", [(0, 0, 0, 0), (0, 0, 0, 1)])
+    draw_map(solution, fraction, topography.side, cmap=black, vmin=0, vmax=1)
     nodes, borders = _window(fraction, topography.side, *window)
     enlarged.contour(nodes, [0.5], extent=borders, origin="lower", colors="black", linewidths=0.9)
     enlarged.legend(
         handles=[
-            Patch(fc=(*_RED, 0.4), ec=(0.75, 0, 0), label="asperities"),
+            Patch(fc=(*_RED, 0.4), ec=_RED, label="asperities"),
             legend_handle(color="black", lw=0.9, label="boundary elements (edge)"),
         ],
         loc="upper center",

@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from icha.datasets import results
-from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, add_legend, area_points, draw_curves, study_curves
+from icha.figures.curves import (
+    AREA_LABEL,
+    PRESSURE_LABEL,
+    RATIO_LABEL,
+    add_legend,
+    draw_curves,
+    limit_ratios,
+    ratio_points,
+    study_curves,
+)
 from icha.figures.declaration import Campaign, Declaration, Inputs, TruthFigure
 from icha.figures.style import DASHES, in_style, new_panels
 from icha.support.input_files import read_columns
@@ -51,10 +60,6 @@ DECLARATION = Declaration(
 )
 
 
-# Height of the lower panels divided by the height of the upper panels.
-_LOWER = 0.5
-
-
 @in_style
 def figure(
     campaign: xr.DataTree,
@@ -69,48 +74,51 @@ def figure(
     Parameters
     ----------
     campaign : the campaign dataset.
-    tables : files of measured curves; panel (b) shows only curves with a known rms slope.
+    tables : files of measured curves; the left panel shows only curves with a known rms slope.
     measurements : for each table, the values of `label`, `columns` (headings and factors), `load_unit`, `material` and
         `rms_slope`. The `load_unit` is the load divided by the reduced pressure. Unknown values are None.
     """
-    # Open markers do not hide each other where curves coincide.
-    curves = study_curves(campaign, study, boundary_elements, mfc="none")
-    fig, panels = new_panels(4.9, 2, sharex="col", sharey="row", height_ratios=(1, _LOWER))
-    (left, right), (left_ratio, right_ratio) = panels
-    ratios = {left_ratio: _area_per_pressure, right_ratio: _area_per_pressure_at_load}
-    *_, (_, drawn), _ = draw_curves(curves, {left: area_points, right: _points_at_load} | ratios, unloading=True)
-    for axes in ratios:
-        axes.set_yscale("linear")
-    left_ratio.set_ylim(0.9 * drawn.min(), 1.1 * drawn.max())
+    curves = study_curves(campaign, study, boundary_elements)
+    looks = curves.looks
+    # If colours distinguish surfaces and slopes, every material has a row of panels.
+    own_rows = looks.by_place and len(looks.materials) > 1
+    if not own_rows:
+        # Open markers do not hide each other where curves coincide.
+        curves = study_curves(campaign, study, boundary_elements, mfc="none")
+    rows = [[material] for material in looks.materials] if own_rows else [looks.materials]
+    fig, panels = new_panels(0.5 + 2.8 * len(rows), len(rows), sharex="col", sharey="col")
+    ratios = []
+    for (left, right), shown in zip(panels, rows, strict=True):
+        of_row = curves._replace(
+            lines=[line for line in curves.lines if line.runs.contact[0] in shown],
+            crosses=[line for line in curves.crosses if line.runs.contact[0] in shown],
+        )
+        *_, (_, drawn) = draw_curves(of_row, {left: _points_at_load, right: ratio_points}, unloading=True)
+        ratios.append(drawn)
+        left.set_ylabel(AREA_LABEL)
+        right.set_ylabel(RATIO_LABEL)
+        if own_rows:
+            right.set_title(looks.material_name(shown[0]), loc="right")
+    limit_ratios(panels[0, 1], np.concatenate(ratios))
+    left, right = panels[0]
     for k, (table, known) in enumerate(zip(tables, measurements, strict=True)):
-        colour = curves.looks.material_colour(known["material"])
+        colour = looks.material_colour(known["material"])
         _draw_measured(left, right, table, known, colour, DASHES[k % len(DASHES)])
-    left.set_ylabel(AREA_LABEL)
-    left_ratio.set(xlabel=PRESSURE_LABEL, ylabel=r"$A E^{\ast}h′_{\mathrm{rms}}/F$")
-    right_ratio.set_xlabel(r"relative load  $F/(E^{\ast}A_0)$")
+    panels[-1, 0].set_xlabel(r"relative load  $F/(E^{\ast}A_0)$")
+    panels[-1, 1].set_xlabel(PRESSURE_LABEL)
     add_legend(fig, [left, right], curves)
     return fig
 
 
 def _draw_measured(left, right, table, known, colour, dashes):
-    """Draw a measured curve in panel (a), and also in panel (b) if the rms slope is known."""
+    """Draw a measured curve in the right panel, and also in the left panel if the rms slope is known."""
     load, area = read_columns(table, known["columns"])
     pressure, slope = load / known["load_unit"], known["rms_slope"]
     look = {"color": colour, "ls": dashes, "lw": 1.1, "zorder": 1}
-    left.plot(pressure, area, label=known["label"], **look)
+    right.plot(pressure, area / pressure, label=known["label"], **look)
     if slope is not None:
-        right.plot(pressure * slope, area, **look)
+        left.plot(pressure * slope, area, **look)
 
 
 def _points_at_load(run):
     return run["reduced_pressure"].values * float(run["rms_slope"]), run["contact_area_fraction"].values
-
-
-def _area_per_pressure(run):
-    """Return reduced pressures, and contact area fractions divided by reduced pressures."""
-    pressure, area = area_points(run)
-    return pressure, np.divide(area, pressure, out=np.full(area.shape, np.nan), where=pressure > 0)
-
-
-def _area_per_pressure_at_load(run):
-    return _points_at_load(run)[0], _area_per_pressure(run)[1]

@@ -97,12 +97,13 @@ class Looks:
         # The steepest slope of a surface has the first marker.
         surfaces = list(dict.fromkeys(surface for surface, _ in self.places))
         ordered = sorted(self.places, key=lambda place: (surfaces.index(place[0]), -(place[1] or 0)))
-        shaped = self.materials if self.by_place else ordered
-        self._markers = dict(zip(shaped, itertools.cycle(MARKERS)))
+        self._markers = {} if self.by_place else dict(zip(ordered, itertools.cycle(MARKERS)))
         self._sizes = {}
         for adhesive, largest in ((False, _BARE_SIZE), (True, _ADHESIVE_SIZE)):
             alike = [material for material in self.materials if self.adhesive(material) == adhesive]
             self._sizes |= {name: max(largest * _NARROWER**rank, _LEAST_SIZE) for rank, name in enumerate(alike)}
+            # Open and closed markers of the same shape differ in their filling.
+            self._markers |= dict(zip(alike, itertools.cycle(MARKERS))) if self.by_place else {}
 
     def adhesive(self, material: str) -> bool:
         """Return True if the surface energy of a material is positive."""
@@ -153,6 +154,12 @@ class Looks:
             found |= {self.place_name(each): grey | {"marker": marker} for each, marker in self._markers.items()}
             found.pop("", None)  # the name is empty if the figure has a single surface and slope
         return {name: legend_handle(**look) for name, look in found.items()}
+
+    def fill(self) -> dict:
+        """Return the filling of a grey marker for all materials: half closed for those with and without adhesion."""
+        closed = {self.adhesive(material) for material in self.materials}
+        alone = {"mfc": GREY if closed == {True} else "white"}
+        return alone if len(closed) == 1 else {"fillstyle": "left", "mfc": GREY, "markerfacecoloralt": "white"}
 
     def heading(self) -> str | None:
         """Return the heading of a legend: the only material, if colours distinguish surfaces and slopes."""
@@ -279,12 +286,17 @@ def graded_colours(count: int, name: str = "viridis", brightest: float = 0.9) ->
 
 
 def _place_colours(places):
-    """Return graded colours; if few surfaces have several slopes each, every surface has a hue."""
+    """Return graded colours; if few surfaces have several slopes each, every surface has a hue.
+
+    Few surfaces without different slopes have the first colours.
+    """
     surfaces = [surface for surface, _ in places]
+    if len(set(surfaces)) == len(places) <= len(COLOURS):
+        return COLOURS[: len(places)]
     hues = dict(zip(dict.fromkeys(surfaces), _HUES, strict=False))
     if len(hues) < max(2, len(set(surfaces))) or len(hues) == len(places):
         return graded_colours(len(places))
-    colours = {surface: iter(graded_colours(surfaces.count(surface), hue, 0.6)) for surface, hue in hues.items()}
+    colours = {surface: iter(graded_colours(surfaces.count(surface), hue, 0.55)) for surface, hue in hues.items()}
     return [next(colours[surface]) for surface in surfaces]
 
 

@@ -194,17 +194,17 @@ def test_fig5_draws_measurements_over_the_curves(tmp_path):
     (tmp_path / "other.csv").write_text("p, a\n1e-3, 3e-3\n1e-2, 3e-2\n2e-2, 5e-2\n")
     measured = {"columns": {"p": 1e3, "a": 0.01}, "load_unit": 1e6, "material": "soft", "rms_slope": 0.2}
     without_slope = {"columns": {"p": 1.0, "a": 1.0}, "load_unit": 1.0, "material": None, "rms_slope": None}
-    left, right, *_ = fig5_multi_slope.figure(
+    left, right = fig5_multi_slope.figure(
         small.tree(),
         [tmp_path / "one.csv", tmp_path / "other.csv"],
         study="slopes",
         measurements=[measured | {"label": "Someone, 2020"}, without_slope | {"label": "Another"}],
     ).axes
-    found = {line.get_label(): line for line in left.get_lines() if not line.get_label().startswith("_")}
+    found = {line.get_label(): line for line in right.get_lines() if not line.get_label().startswith("_")}
     assert set(found) == {"Someone, 2020", "Another"}
-    np.testing.assert_allclose(found["Someone, 2020"].get_xydata(), [(1e-3, 2e-3), (1e-2, 2e-2), (2e-2, 4e-2)])
-    np.testing.assert_array_equal(found["Another"].get_ydata(), [3e-3, 3e-2, 5e-2])
-    shifted = [line for line in right.get_lines() if len(line.get_xdata()) == 3]
+    np.testing.assert_allclose(found["Someone, 2020"].get_xydata(), [(1e-3, 2), (1e-2, 2), (2e-2, 2)])
+    np.testing.assert_allclose(found["Another"].get_ydata(), [3, 3, 2.5])
+    shifted = [line for line in left.get_lines() if len(line.get_xdata()) == 3]
     assert len(shifted) == 1
     np.testing.assert_allclose(shifted[0].get_xdata(), [2e-4, 2e-3, 4e-3])
 
@@ -284,8 +284,9 @@ def test_fig2_marks_boundary_elements_in_the_colour_of_the_material():
         assert len(crosses) == 2 and len(runs) == 2
         assert {line.get_markeredgecolor() for line in crosses} == {line.get_markeredgecolor() for line in runs}
         for line, entry in zip(crosses, ("adhesive", "bare"), strict=True):
-            truth = compared.errors()[entry][f"{name}_boundary_elements"].values
-            np.testing.assert_allclose(line.get_ydata(), truth.mean(axis=1).ravel(), rtol=1e-12)
+            truth = compared.errors()[entry][f"{name}_boundary_elements"].values.mean(axis=1).ravel()
+            unit = np.array(compared.PRESSURES) if axes is figure.axes[0] else 1.0
+            np.testing.assert_allclose(line.get_ydata(), truth / unit, rtol=1e-12)
             assert sorted(set(line.get_xdata())) == list(compared.PRESSURES)
     names = legend(figure)
     assert names.count("boundary elements at finite range") == 1 and "boundary elements" not in names
@@ -312,8 +313,9 @@ def test_fig2_draws_theories_of_separate_summits_where_there_are_any():
         drawn = [line for line in axes.get_lines() if line.get_linewidth() == 0.8 and len(line.get_xdata())]
         assert len(drawn) == 2  # Greenwood & Williamson, and Fuller & Tabor of the study's material
         values = references[name if name in references else f"greenwood_williamson_{name}"].values
-        np.testing.assert_array_equal(drawn[0].get_ydata(), values)
-        np.testing.assert_array_equal(drawn[0].get_xdata(), references["greenwood_williamson_reduced_pressure"].values)
+        load = references["greenwood_williamson_reduced_pressure"].values
+        np.testing.assert_array_equal(drawn[0].get_ydata(), values / load if axes is figure.axes[0] else values)
+        np.testing.assert_array_equal(drawn[0].get_xdata(), load)
         assert np.all(drawn[1].get_xdata() > 0)
         runs = {line.get_markeredgecolor() for line in axes.get_lines() if line.get_marker() not in ("1", "x", "None")}
         assert drawn[1].get_color() in runs
@@ -359,10 +361,10 @@ def test_fig5_marks_boundary_elements_of_the_study_or_of_another():
     for study, options in (("slopes", {}), ("truth", {"boundary_elements": "truth"})):
         beside = labels._replace(study=study, model="boundary_elements")
         figure = fig5_multi_slope.figure(campaign_tree([*runs, (beside, own)]), study="slopes", **options)
-        for axes, factor in zip(figure.axes, (1.0, labels.rms_slope) * 2, strict=True):
+        for axes, factor in zip(figure.axes, (labels.rms_slope, 1.0), strict=True):
             (crosses,) = lines_of(axes, "+")
             np.testing.assert_allclose(crosses.get_xdata(), factor * np.array(small.PRESSURES), rtol=1e-6)
-            areas = crosses.get_ydata() * (1.0 if axes in figure.axes[:2] else np.array(small.PRESSURES))
+            areas = crosses.get_ydata() * (1.0 if axes is figure.axes[0] else np.array(small.PRESSURES))
             found = np.isclose(areas[:, None], own["contact_area_fraction"].values, rtol=1e-6)
             assert found.any(axis=1).all()
             drawn = {line.get_color() for line in axes.get_lines() if line.get_marker() not in ("+", "None")}
@@ -377,9 +379,10 @@ def test_fig10_shows_means_and_seeds_of_the_errors_in_per_cent():
     expected = 100 * (1 / np.array(list(compared.AREA_FACTORS.values())) - 1)
     (adhesive, _, bars), (bare, _, _) = left.containers
     np.testing.assert_allclose(adhesive.get_ydata(), expected.mean())
-    # Three seeds are too few for a confidence interval: they are shown themselves.
-    dots = next(line for line in left.get_lines() if line.get_color() == adhesive.get_color() and dotted(line))
-    assert bars == () and sorted(set(np.round(dots.get_ydata(), 9))) == sorted(np.round(expected, 9))
+    # Three seeds are too few for a confidence interval: the bars are their range.
+    for (_, low), (_, high) in bars[0].get_segments():
+        assert (low, high) == pytest.approx((expected.min(), expected.max()))
+    assert "means, bars from least to largest, n = 3" in legend(left.figure)
     np.testing.assert_allclose(bare.get_ydata(), -20)
     np.testing.assert_allclose(right.containers[1][0].get_ydata(), 25)
     np.testing.assert_allclose(adhesive.get_xdata(), compared.PRESSURES, rtol=0.03)
@@ -459,11 +462,6 @@ def shaded(axes):
     return found
 
 
-def dotted(line):
-    """Whether a line shows single seeds as dots."""
-    return line.get_marker() == "."
-
-
 def many_seeds(count=5):
     return campaign_tree((LABELS._replace(study="many", seed=k), small.run(k)) for k in range(1, count + 1))
 
@@ -472,11 +470,13 @@ def test_fig2_shows_means_with_bands_that_stay_above_zero():
     figure = fig2_area_and_gap.figure(many_seeds(), study="many")
     for axes, name in zip(figure.axes[:2], ("contact_area_fraction", "reduced_separation"), strict=True):
         (mean,) = [line for line in axes.get_lines() if len(line.get_xdata()) == len(small.PRESSURES)]
-        over = ensemble([path_steps(small.run(k))[name].values for k in range(1, 6)])
-        np.testing.assert_allclose(mean.get_ydata(), over.mean, rtol=1e-12)
+        ratio = axes is figure.axes[0]
+        unit = np.array(small.PRESSURES) if ratio else 1.0
+        over = ensemble([path_steps(small.run(k))[name].values / unit for k in range(1, 6)])
+        np.testing.assert_allclose(mean.get_ydata(), over.mean, rtol=1e-9)
         (edges,) = shaded(axes).values()
-        np.testing.assert_allclose(edges, over.band(positive=True), rtol=1e-12)
-        assert np.all(edges > 0) and axes.get_yscale() == "log"
+        np.testing.assert_allclose(edges, over.band(positive=True), rtol=1e-9)
+        assert np.all(edges > 0) and axes.get_yscale() == ("linear" if ratio else "log")
     assert legend(figure).count("mean and 95 % band, n = 5") == 1
 
 
@@ -486,12 +486,13 @@ def test_few_seeds_have_no_band_and_are_drawn_themselves():
         assert not shaded(axes)
         for material, colour in material_colours(compared.tree()).items():
             own = [run for labels, run in compared.runs().items() if labels.material == material]
-            values = [path_steps(run)[name].values for run in own]
+            unit = np.array(compared.PRESSURES) if axes is figure.axes[0] else 1.0
+            values = [path_steps(run)[name].values / unit for run in own]
             drawn = [line for line in axes.get_lines() if line.get_color() == colour]
             (mean,) = [line for line in drawn if line.get_marker() == "o"]
-            np.testing.assert_allclose(mean.get_ydata(), np.mean(values, axis=0), rtol=1e-12)
+            np.testing.assert_allclose(mean.get_ydata(), np.mean(values, axis=0), rtol=1e-9)
             single = [line.get_ydata() for line in drawn if line.get_marker() == "None"]
-            np.testing.assert_allclose(single, values, rtol=1e-12)
+            np.testing.assert_allclose(single, values, rtol=1e-9)
     names = legend(figure)
     assert names.count("single seeds beside their mean, n = 3") == 1 and not any("95" in name for name in names)
 
@@ -563,7 +564,7 @@ def test_a_material_has_one_colour_and_a_model_one_marker_in_all_figures_of_a_ca
         line = handle if hasattr(handle, "get_color") else handle.get_children()[0]
         assert to_hex(np.atleast_1d(line.get_color())[0]) == to_hex(colours["soft"])
         drawn = [line for line in figure.axes[0].get_lines() if line.get_color() == colours["soft"]]
-        assert drawn and {line.get_marker() for line in drawn} <= {"o", "+", "1", ".", "None", None}
+        assert drawn and {line.get_marker() for line in drawn} <= {"o", "+", "1", ".", "_", "None", None}
 
 
 def many(surfaces=9, materials=1):
@@ -670,12 +671,13 @@ def caption_of_fig2(study, **data):
 def test_captions_state_only_what_the_figure_contains():
     tree = small.tree()
     bare = caption_of_fig2("slopes", campaign=tree)
-    assert "Open shapes are results without adhesion." in bare and "boundary elements" not in bare
+    assert "Open shapes are without adhesion." in bare and "boundary elements" not in bare
     assert "Lines are means" not in bare and "Thin dashed" not in bare and "theories" not in bare
+    assert "Ratio of contact area and load (a)" in bare and "mean separation divided by rms height (b)" in bare
     seeds = caption_of_fig2("single", campaign=tree)
     assert "Lines are means over the seeds" in seeds and "Pale thin lines" in seeds and "A band" not in seeds
     both = caption_of_fig2("one", campaign=compared.tree_of_both())
-    assert "The lower panels show" in both and "Open shapes" in both and "three arms" not in both
+    assert "Panels (c) and (d) show" in both and "Open shapes" in both and "three arms" not in both
     assert "three arms" in caption_of_fig2("one", campaign=compared.tree(), model_error=compared.errors())
 
 
@@ -712,7 +714,7 @@ def test_single_seeds_are_drawn_only_beside_few_curves(monkeypatch):
 def test_captions_name_the_units_and_the_models_that_are_drawn():
     alone = campaign_tree(compared.patches())
     caption = caption_of_fig2("one", campaign=alone, units="physical")
-    assert "mean gap (b), against the nominal pressure" in caption and "Crosses are results of boundary" in caption
+    assert "mean gap (b), against the nominal pressure" in caption and "Crosses are boundary elements" in caption
     assert not any(words in caption for words in ("reduced", "asperity model", "GFMD"))
 
 

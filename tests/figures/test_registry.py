@@ -23,5 +23,5 @@ def test_figures_are_in_the_order_of_their_numbers_and_captions_are_sentences():
     assert numbers == sorted(set(numbers)) and len(numbers) == 21
     for name in DECLARATIONS:
         assert callable(figure_module(name).figure)
-        caption = caption_of(name, "mean separation\nreduced pressure")
-        assert len(caption) > 100 and caption.endswith(".") and not set("{[]") & set(caption)
+        caption = caption_of(name, "mean separation\narea over load")
+        assert len(caption) > 80 and caption.endswith(".") and not set("{[]") & set(caption)
