@@ -43,8 +43,8 @@ def texts_of(figure: Figure, data: Mapping[str, object], studies: Sequence[str])
     """Return all texts of a figure, and words for what no text of a figure tells, as lines.
 
     Words are the names of the `data`, and words for the `studies` that are shown: materials that are `bare`, `adhesive`
-    or both, `several surfaces`, `several slopes`, `periodic` surfaces, and boundary elements that the model was compared
-    with, `in the limit` or `at finite range`.
+    or `with and without adhesion`; `several surfaces`, `several slopes`, `periodic` surfaces; boundary elements with
+    which the model was compared, `in the limit` or `at finite range`.
     """
     from matplotlib.text import Text
 
