@@ -163,6 +163,14 @@ def test_all_processes_end_with_snakemake(long):
     wait_for(lambda: not is_alive(job) and not is_alive(server))
 
 
+def test_a_fork_server_whose_snakemake_was_killed_ends_before_it_imports_libraries(workflow):
+    found = os.pathsep.join([str(workflow.folder), str(REPOSITORY / "workflow/plugins")])
+    program = "import snakemake_executor_plugin_icha.preload"
+    for executor, status in {os.getpid(): 0, os.getppid(): 1}.items():
+        environment = os.environ | {"PYTHONPATH": found, "ICHA_EXECUTOR": str(executor)}
+        assert subprocess.run([sys.executable, "-c", program], env=environment).returncode == status
+
+
 @pytest.mark.slow
 def test_the_next_call_repeats_a_job_whose_fork_server_was_killed(workflow, long):
     process, job, server = long

@@ -44,6 +44,7 @@ class Executor(LocalExecutor):
         self._processes.set_forkserver_preload([f"{__name__}.preload"])
         # Libraries read these variables when they are loaded. Snakemake sets the variables only for new processes.
         os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"))
+        os.environ["ICHA_EXECUTOR"] = str(os.getpid())  # the fork server ends with this process
         # Without a spec, forks would import the main program: the whole command line of Snakemake.
         program = sys.modules["__main__"]
         program.__spec__ = program.__spec__ or find_spec("snakemake.__main__")

@@ -21,7 +21,8 @@ def _modules():
     return [".".join(("icha", *file.with_suffix("").parts)) for file in files if file.parts[0] not in _EXCLUDED]
 
 
-end_with_parent(os.getppid())
+# Snakemake may have been killed already, and then `os.getppid()` is the number of another process.
+end_with_parent(int(os.environ["ICHA_EXECUTOR"]))
 for _name in [*_modules(), *_LATE]:
     # If a module is missing, the job that needs this module reports the error.
     with contextlib.suppress(Exception):
