@@ -43,6 +43,7 @@ def read_yaml(path: Path) -> dict:
 _MEANINGS = {
     r"found character '\\t'": "a tab; YAML allows only spaces in front of a key",
     r"expected ',' or '[]}]'": "a bracket from line {} is not closed, or a comma is missing",
+    "2002:merge": "the key <<; write values that several entries share in the section `defaults`",
     "mapping values are not allowed": "a second colon; put text with a colon into quotes, and a key on its own line",
     "unexpected end of stream": "the quotes from line {} are not closed",
 }

@@ -164,12 +164,16 @@ class EnergyBalance:
            and jumps off share the loss in proportion to their reference losses, which must not have different signs.
         2. In all other cases, each jump causes its reference loss. The rest of the loss is attributed to
            coalescence if the step has a coalescence or split; otherwise it is unattributed.
+
+        With error-controlled steps, jumps always cause the whole loss if the sum of the reference losses is not zero:
+        a jump may be far from the end of the step, where its reference loss is computed, so this is only an estimate.
         """
         energy, kinds, united = step.events.energy, step.events.kind, step.unites_or_splits
         jump_in, jump_off = (float(energy[kinds == kind].sum()) / contact.area for kind in (JUMP_IN, JUMP_OFF))
         ratio = step.loss / ((jump_in + jump_off) or np.inf)
         certain = 0.5 < ratio < 2 or abs(step.loss) > _CERTAIN_LOSS * abs(step.work)
-        if not united and ratio and certain and jump_in * jump_off >= 0:
+        by_jumps = contact.path_accuracy.error_controlled_steps or (certain and not united)
+        if by_jumps and ratio and jump_in * jump_off >= 0:
             scale = step.loss / (jump_in + jump_off)
             jump_in, jump_off = scale * jump_in, scale * jump_off
         rest = step.loss - jump_in - jump_off

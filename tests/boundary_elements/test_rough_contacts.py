@@ -18,7 +18,7 @@ from icha.boundary_elements.front_solver import LinearisedFront
 from icha.boundary_elements.half_space import HalfSpace
 from icha.checks.run import check_run
 from icha.contact.model import NotConverged
-from icha.contact.models import AREA_TOLERANCE_CELLS
+from icha.contact.models import AREA_TOLERANCE_CELLS, MODELS, REFERENCE_MODEL
 from validation.rough_contacts import (
     HARD,
     SOFT,
@@ -66,6 +66,19 @@ def test_loss_of_a_loop_with_adhesion_hardly_depends_on_the_step():
     for row in (coarse, fine):
         assert abs(row["not_closed"]) <= 1e-6 * row["largest_work"]
     assert coarse["work"] == pytest.approx(fine["work"], abs=1e-4 * fine["largest_work"])
+
+
+@pytest.mark.slow
+def test_losses_by_each_kind_of_event_hardly_depend_on_the_accuracy_of_the_work(monkeypatch):
+    """The energies that lone patches would release are twice the losses, if the steps are long."""
+    surface, material = rough(64, 8), dataclasses.replace(SOFT, surface_energy=4 * SOFT.surface_energy)
+    coarse, model = loop(surface, 1e-2, 0.2, material), MODELS[REFERENCE_MODEL]
+    accuracy = dataclasses.replace(model.accuracy, loss=1e-6)
+    monkeypatch.setitem(MODELS, REFERENCE_MODEL, dataclasses.replace(model, accuracy=accuracy))
+    fine = loop(surface, 1e-2, 0.2, material)
+    assert fine["steps"] > 2 * coarse["steps"] and fine["jump_in"] > 4e-4 * fine["largest_work"]
+    for part in ("work", "jump_in", "jump_off", "coalescence", "unattributed"):
+        assert coarse[part] == pytest.approx(fine[part], abs=1e-4 * fine["largest_work"])
 
 
 def test_load_and_area_hardly_depend_on_the_grid():

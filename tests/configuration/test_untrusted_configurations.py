@@ -312,6 +312,7 @@ def _loaded_or_refused(file, text):
         ("    rms_slopes", "\trms_slopes", "rms_slopes", "a tab; YAML allows only spaces in front of a key"),
         ("name: demo", "name: demo: x", "name", "a second colon; put text with a colon into quotes"),
         ("name: demo", 'name: "demo', "name", "the quotes from line {} are not closed"),
+        ("name: demo", "<<: {name: demo}", "<<", "the key <<; write values that several entries share"),
     ],
 )
 def test_slips_in_yaml_are_explained(tmp_path, before, after, line, message):
