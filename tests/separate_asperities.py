@@ -54,13 +54,19 @@ class Asperities:
         return self.law.energy(self.law.contact_radius(approach, R), R)
 
     def state(self, separation, touching):
-        """Pressure (Pa), area fraction and stored energy (J/m^2) of some of the asperities in contact."""
+        """Pressure (Pa), area fraction, energy (J/m^2) and stiffness (Pa/m) of some of the asperities in contact."""
         approach = (self.height - separation)[touching]
         a = self.law.contact_radius(approach, self.radius_of_curvature)
+        with np.errstate(divide="ignore", invalid="ignore"):  # infinite at jump-off, 0/0 without force
+            R = self.radius_of_curvature
+            stiffness = np.nan_to_num(
+                self.law.force_derivative(a, R) / self.law.approach_derivative(a, R), posinf=np.inf
+            )
         values = (
             np.sum(self.law.force(a, self.radius_of_curvature)),
             np.pi * np.sum(a**2),
             np.sum(self.energy(approach)),
+            np.sum(stiffness),
         )
         return np.array(values) / PERIOD**2
 
@@ -86,7 +92,7 @@ class Asperities:
         u, leg, event = (
             np.array(column) for column in list(zip(*[(u, leg, k) for u, leg, _, k in steps], strict=True))
         )
-        pressure, area, stored = np.array([self.state(u, touching) for u, _, touching, _ in steps]).T
+        pressure, area, stored, stiffness = np.array([self.state(u, touching) for u, _, touching, _ in steps]).T
         released = np.zeros((2, len(steps)))
         for at in np.flatnonzero(event >= 0):
             released[leg[at], at] = stored[at - 1] - stored[at]
@@ -94,11 +100,13 @@ class Asperities:
         work = stored + jump_in + jump_off
         unit = self.material.contact_modulus * self.rms_slope
         found = np.flatnonzero(event >= 0)
+        counts = {f"{kind}_count": np.cumsum((event >= 0) & (leg == k)) for k, kind in enumerate(EVENTS)}
         per_step = {
             "mean_separation": u,
             # Shown of free squares only.
             "mean_gap": u,
             "nominal_pressure": pressure,
+            "contact_stiffness": stiffness,
             "contact_area_fraction": area,
             "spot_count": np.array([np.count_nonzero(touching) for _, _, touching, _ in steps]),
             "converged": np.ones(len(steps), np.int8),
@@ -113,6 +121,7 @@ class Asperities:
             "dissipated_by_jump_off": jump_off,
             "dissipated_by_coalescence": 0 * u,
             "dissipated_by_load_jump": 0 * u,
+            **counts,
         }
         per_event = {
             "event_kind": leg[found].astype(np.int8),
@@ -129,6 +138,8 @@ class Asperities:
             **get_values(self.material, *MATERIAL),
             "rms_slope": self.rms_slope,
             "rms_height": self.rms_height,
+            "unit_slope": self.rms_slope,
+            "unit_height": self.rms_height,
             "boundary": "periodic",
             "period": PERIOD,
             "grid": GRID,

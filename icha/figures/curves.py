@@ -225,7 +225,7 @@ def physical_points(name: str, pressure: Axis, factor: float = 1.0) -> Points:
 
 
 def draw_curves(
-    curves: Curves, panels: Mapping[Axes, Points], *, unloading: bool = False
+    curves: Curves, panels: Mapping[Axes, Points], *, unloading: bool = False, count: int | None = None
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Draw the curves of a study on double logarithmic axes.
 
@@ -234,6 +234,7 @@ def draw_curves(
     curves : the curves.
     panels : for each panel, the function that returns the points of a run.
     unloading : True to draw unloading as well.
+    count : number of curves in the figure, if there are more than these.
 
     Returns
     -------
@@ -242,7 +243,7 @@ def draw_curves(
     drawn = {axes: [] for axes in panels}
     for line in curves.lines:
         for axes, points in panels.items():
-            drawn[axes].append(_draw_line(axes, line, points, len(curves.lines)))
+            drawn[axes].append(_draw_line(axes, line, points, count or len(curves.lines)))
         if unloading:
             _draw_unloading(panels, line)
     for line in curves.crosses:

@@ -199,9 +199,10 @@ class Points:
         """Number of seeds in the mean of each point."""
         return np.isfinite(self.members[0]).sum(axis=0).tolist()
 
-    def draw(self, axes: Axes, look: dict, quantity: int = 1) -> ErrorbarContainer:
-        """Draw the variable with index `quantity` in `quantities` against the first variable."""
-        return draw_points(axes, self.members[0], self.members[quantity], look, positive=True, asked=self.asked)
+    def draw(self, axes: Axes, look: dict, quantity: int = 1, *, shift: float = 1.0) -> ErrorbarContainer:
+        """Draw the variable with index `quantity` in `quantities` against the first variable, multiplied by `shift`."""
+        x, y = shift * self.members[0], self.members[quantity]
+        return draw_points(axes, x, y, look, positive=True, asked=self.asked)
 
 
 def lines_handles(counts: Iterable[int]) -> dict[str, Line2D]:
@@ -216,7 +217,7 @@ def lines_handles(counts: Iterable[int]) -> dict[str, Line2D]:
 def points_handles(counts: Iterable[int]) -> dict[str, Line2D]:
     """Return the legend entries of points that are means over `counts` seeds."""
     bars = {"marker": "|", "ls": "none", "ms": 8}
-    return _handles(counts, {"means, bars 95 %": bars, "means, bars from least to largest": bars})
+    return _handles(counts, {"means, bars 95 %": bars, "means, bars from smallest to largest": bars})
 
 
 def _handles(counts, looks):

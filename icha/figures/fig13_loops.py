@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from icha.contact.model import EVENT_KINDS
 from icha.contact.models import MODELS, REFERENCE_MODEL
 from icha.datasets import results
 from icha.datasets.labels import ContactLabels
@@ -66,7 +67,10 @@ _SMALL_TENSION = 0.25
 _REACH = 1.4
 # Distance between the markers of boundary elements, divided by the diagonal of the panel.
 _APART = 0.025
-_LOOP = {"lw": 0.9}
+# Loading is a pale, wide line, so that it is visible where unloading coincides with it.
+_BRANCHES = {"loading": {"lw": 2.6, "alpha": 0.4}, "unloading": {"lw": 0.9}}
+# Number of points that are drawn between two states without an event in between.
+_POINTS_BETWEEN = 8
 _PULL_OFF = {"ls": "none", "mec": "black", "mew": 0.7, "ms": 4.6, "zorder": 6}
 _TRUTH = {"ls": "none", "ms": 3.6, "mew": 0.7, "zorder": 5}
 _TRUTH_MARKERS = {"loading": MODEL_MARKERS, "unloading": UNLOADING_MARKERS}
@@ -151,12 +155,14 @@ def figure(
                 _draw(ax, loop, names, turn=len(slopes) > 1)
         for ax in middle:
             ax.axhline(0, color=GREY, lw=0.5, zorder=1)
-            ax.ticklabel_format(style="sci", scilimits=(-2, 3), useMathText=True)
             ax.xaxis.set_major_locator(MaxNLocator(4))
-            ax.yaxis.set_offset_position("right")
             ax.text(0.95, 0.9, "near zero load", transform=ax.transAxes, ha="right", fontsize=8)
             if window:
                 ax.set(xlim=window[0], ylim=window[1])
+            exponent = min(int(np.floor(np.log10(ax.get_ylim()[1]))), 0)
+            ax.yaxis.set_major_formatter(lambda value, _, unit=10.0**exponent: f"{value / unit:.4g}".replace("-", "−"))
+            times = rf"$10^{{{-exponent}}}\times$ " if exponent else ""
+            ax.set_ylabel(times + pressure.label.partition("  ")[2])
         left.set_ylabel(pressure.label)
         right.set_ylabel(AREA_LABEL)
         if own_rows:
@@ -172,15 +178,21 @@ def figure(
 
 
 def _in_units(run, pressure, separation):
-    """Return a run with the variables `load` and `separation`: reduced values, multiplied by two factors."""
-    return run.assign(load=run["reduced_pressure"] * pressure, separation=run["reduced_separation"] * separation)
+    """Return a run with the variables `load` and `separation`, reduced values times two factors, and their `slope`."""
+    load, apart = run["reduced_pressure"] * pressure, run["reduced_separation"] * separation
+    run = run.assign(load=load, separation=apart)
+    if "contact_stiffness" not in run:  # boundary elements at a finite range are drawn as separate states
+        return run
+    unit = run["contact_modulus"] * run["unit_slope"] / run["unit_height"]
+    return run.assign(slope=-run["contact_stiffness"] / unit * pressure / separation)
 
 
 def _draw(ax, loop, names, *, turn):
     """Draw a loop with a marker at pull-off; if `turn` is True, also mark the end of the first loading."""
     run, colour = loop.run, loop.look["color"]
     for branch, leg in select.branches(run):
-        ax.plot(*(leg[name] for name in names), ls=BRANCH_DASHES[branch], color=colour, **_LOOP)
+        line = _curve(leg) if names == _LOADS else [leg[name].values for name in names]
+        ax.plot(*line, ls=BRANCH_DASHES[branch], color=colour, **_BRANCHES[branch])
     marked = [(np.flatnonzero(run["leg"] == 0)[-1], {"ls": "none", "zorder": 5})] if turn else []
     if (at := select.pull_off_step(run)) is not None:
         marked.append((at, _PULL_OFF))
@@ -191,6 +203,21 @@ def _draw(ax, loop, names, *, turn):
             states = truth.isel(step=truth["branch"].values == branch)
             marker = markers[_truth_name(truth)]
             ax.plot(*(states[name] for name in names), color=colour, marker=marker, markevery=_APART, **_TRUTH)
+
+
+def _curve(leg):
+    """Return separations and loads along a leg: between two states cubic, with events in between straight."""
+    separation, load, slope = leg["separation"].values, leg["load"].values, leg["slope"].values
+    width, change = np.diff(separation)[:, None], np.diff(load)[:, None]
+    t = np.linspace(0, 1, _POINTS_BETWEEN, endpoint=False)
+    with np.errstate(invalid="ignore"):  # the slope may be infinite, just before a jump and in full contact
+        # Slopes relative to the chord determine how far the cubic polynomial is from the chord.
+        start, end = (width * each[:, None] - change for each in (slope[:-1], slope[1:]))
+        bulge = t * (1 - t) * ((1 - t) * start - t * end)
+    smooth = np.all([np.diff(leg[f"{kind}_count"].values) == 0 for kind in EVENT_KINDS], axis=0)[:, None]
+    bulge = np.where(smooth & (np.abs(bulge) <= np.abs(change)).all(axis=1, keepdims=True), bulge, 0.0)
+    separations, loads = separation[:-1, None] + width * t, load[:-1, None] + change * t + bulge
+    return np.append(separations, separation[-1]), np.append(loads, load[-1])
 
 
 def _small_tensions(loops):
@@ -212,9 +239,9 @@ def _small_tensions(loops):
 
 def _handles(looks, loops, *, marked):
     """Return the legend entries by name; `marked` is True if markers distinguish the loops."""
-    handles = looks.handles(**_LOOP, **({} if marked else {"marker": "none"}))
+    handles = looks.handles(**_BRANCHES["unloading"], **({} if marked else {"marker": "none"}))
     for branch, dashes in BRANCH_DASHES.items():
-        handles[branch] = legend_handle(color=GREY, ls=dashes, **_LOOP)
+        handles[branch] = legend_handle(color=GREY, ls=dashes, **_BRANCHES[branch])
     if any(select.pull_off_step(loop.run) is not None for loop in loops):
         handles["pull-off"] = legend_handle(marker="o", mfc=GREY, **_PULL_OFF)
     for name in dict.fromkeys(_truth_name(truth) for loop in loops for truth in loop.truths):

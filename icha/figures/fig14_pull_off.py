@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pydantic import Field
 
-from icha.figures.curves import drop_rounding_errors
+from icha.contact.models import MODELS, REFERENCE_MODEL
+from icha.datasets.variables.model_error import SHORT_RANGE
+from icha.figures.curves import cross_look, drop_rounding_errors
 from icha.figures.declaration import Campaign, Declaration, StudyFigure, problems_of_unloading
 from icha.figures.ensembles import Points, points_handles
-from icha.figures.looks import legend_below, looks_of_studies
-from icha.figures.select import name_models, select_detached_lines
+from icha.figures.looks import ASPERITIES_NAME, legend_below, looks_of_studies, model_handle
+from icha.figures.select import select_detached_lines
 from icha.figures.style import GREY, ONE_COLUMN, TWO_COLUMNS, in_style, logarithmic_axes, new_panels
 from icha.support.formatting import choose_unit
 from icha.support.values import Problem, list_of_names
@@ -46,7 +48,10 @@ DECLARATION = Declaration(
 
 # The axis is linear if the ratio of the largest to the smallest value is at most this number.
 _SPAN = 30.0
-_LINE = {"lw": 0.9}
+_LINE = {"lw": 0.9, "ls": "-"}
+_TRUTH = {"lw": 0.8, "ls": (0, (3, 2))}
+# Points at the same slope or load are drawn side by side. The last and the first of many lines have nearly this ratio.
+_SPREAD = 1.1
 # Variable on the y axis.
 _Y = "pull_off_pressure"
 
@@ -55,20 +60,25 @@ _Y = "pull_off_pressure"
 def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = ()) -> Figure:
     """Draw the pull-off pressure (mean over the seeds) against slope, and against the largest load of the path."""
     load_studies = list(dict.fromkeys(load_studies))
-    by_slope = select_detached_lines(campaign, [study], along_slopes=True)
-    by_load = select_detached_lines(campaign, load_studies)
+    by_slope = select_detached_lines(campaign, [study], along_slopes=True, both_models=True)
+    by_load = select_detached_lines(campaign, load_studies, both_models=True)
     points = list(itertools.chain(*by_slope.values(), *by_load.values()))
     if len({point.labels.rms_slope for point in points}) == 1:  # the same markers in both panels
-        by_load = {((*contact[:2], None), applicable): line for (contact, applicable), line in by_load.items()}
-    looks = looks_of_studies(campaign, [study, *load_studies], [contact for contact, _ in (*by_slope, *by_load)])
+        by_load = {((*contact[:2], None), *of): line for (contact, *of), line in by_load.items()}
+    looks = looks_of_studies(campaign, [study, *load_studies], [contact for contact, *_ in (*by_slope, *by_load)])
+    models = {point.labels.model for point in points}
     factor, unit = choose_unit(max(float(run[_Y]) for point in points for run in point.by_seed.values()), "Pa")
 
     fig, [panels] = new_panels(2.9, columns=2 if by_load else 1, width=TWO_COLUMNS if by_load else ONE_COLUMN)
     counts = []
     for ax, x, drawn in zip(panels, ("rms_slope", "largest_reduced_pressure"), (by_slope, by_load), strict=False):
         lines = {key: Points(line, x, _Y, factor=factor) for key, line in drawn.items()}
-        for (contact, applicable), line in lines.items():
-            line.draw(ax, looks.look(contact, applicable=applicable) | _LINE)
+        for position, ((contact, applicable, model), line) in enumerate(lines.items()):
+            crosses = len(models) > 1 and model == REFERENCE_MODEL
+            look = (
+                cross_look(looks, contact) | _TRUTH if crosses else looks.look(contact, applicable=applicable) | _LINE
+            )
+            line.draw(ax, look, shift=_SPREAD ** ((position + 0.5) / len(lines) - 0.5))
             counts += line.counts
         loads, values = np.concatenate([line.means for line in lines.values()], axis=1)
         _scale(ax, values)
@@ -76,6 +86,7 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
     slopes = sorted({point.labels.rms_slope for line in by_slope.values() for point in line})
     scale = "log" if slopes[-1] > 3 * slopes[0] else "linear"
     panels[0].set(xlabel=r"rms slope  $h′_{\mathrm{rms}}$", xscale=scale)
+    panels[0].set_xlim(slopes[0] / 1.25, slopes[-1] * 1.25)
     panels[0].set_xticks(slopes, [f"{slope:g}" for slope in slopes])
     panels[0].minorticks_off()
     if by_load:
@@ -83,8 +94,13 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
         if loads.min() > 0:
             logarithmic_axes(panels[1], "x")
             panels[1].set_xlim(loads.min() / 1.6, loads.max() * 1.6)
-    name_models(panels[0], points)
-    legend_below(fig, looks.handles(**_LINE) | points_handles(counts), looks.heading())
+    handles, words = looks.handles(**_LINE), [MODELS[model].words for model in models]
+    if len(models) > 1:
+        handles |= {ASPERITIES_NAME: model_handle(ASPERITIES_NAME, **_LINE | looks.fill())}
+        handles |= {SHORT_RANGE: model_handle(SHORT_RANGE, **_TRUTH)}
+        words = []
+    panels[0].set_title(", ".join([*words, *filter(None, [looks.heading()])]), loc="right", fontsize=8)
+    legend_below(fig, handles | points_handles(counts))
     return fig
 
 

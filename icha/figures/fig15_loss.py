@@ -66,7 +66,7 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
 
     studies = list(dict.fromkeys(studies))
     runs = select_detached_lines(campaign, studies)
-    looks = looks_of_studies(campaign, studies, [contact for contact, _ in runs])
+    looks = looks_of_studies(campaign, studies, [contact for contact, *_ in runs])
     sticky = {key: line for key, line in runs.items() if looks.adhesive(key[0][0])}
     if not sticky:
         raise NothingToDraw(f"studies {', '.join(studies)}: no run with adhesion; the figure needs a surface energy")
@@ -85,7 +85,7 @@ def _draw_losses(ax, runs, looks):
     quantities = "largest_contact_area_fraction", "hysteresis_loss_over_surface_energy"
     drawn = {key: Points(line, *quantities) for key, line in runs.items()}
     handles = looks.handles(ls="none") if looks.many else {}
-    for (contact, applicable), line in drawn.items():
+    for (contact, applicable, _), line in drawn.items():
         handle = line.draw(ax, looks.look(contact, applicable=applicable) | {"ls": "none"})
         if not applicable:
             continue
@@ -131,7 +131,7 @@ def _draw_parts(ax, runs, looks):
     """Draw the parts of the loss of every line as a stacked bar; return the names of the drawn parts."""
     bars = {key: shares(line) for key, line in runs.items()}
     shown = [name for name in PARTS if any(abs(bar[name]) >= _LEAST_SHARE for bar in bars.values())]
-    for position, ((contact, applicable), bar) in enumerate(bars.items()):
+    for position, ((contact, applicable, _), bar) in enumerate(bars.items()):
         above, below = 0.0, 0.0
         for name in shown:
             share = 100 * bar[name]
@@ -142,7 +142,7 @@ def _draw_parts(ax, runs, looks):
         ax.plot(position, -0.055, transform=ax.get_xaxis_transform(), clip_on=False, **look | {"ls": "none"})
     ax.axhline(0, color="black", lw=0.6)
     ax.set(xlim=(-0.7, len(bars) - 0.3), ylabel="share of the loss (%)")
-    ax.set_xticks(range(len(bars)), [looks.place_name(tuple(place)) for (_, *place), _ in bars], rotation=90)
+    ax.set_xticks(range(len(bars)), [looks.place_name(tuple(place)) for (_, *place), *_ in bars], rotation=90)
     ax.tick_params("x", length=0, pad=14, labelsize=7)
     ax.set_xlabel("lines of (a), at their largest load", labelpad=2)
     return shown

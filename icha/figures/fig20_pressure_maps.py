@@ -93,7 +93,7 @@ def figure(campaign: xr.DataTree, maps: xr.Dataset, *, run: Sequence) -> Figure:
     side = float(maps["period"]) * length
     columns = min(len(shown), _COLUMNS)
     rows = -(-len(shown) // columns)
-    fig, panels = new_panels(2.5 * rows, rows, columns, width=2.15 * columns + 0.65, sharex=True, sharey=True)
+    fig, panels = new_panels(2.7 * rows + 0.1, rows, columns, width=2.15 * columns + 0.65, sharex=True, sharey=True)
     window = _window(touching.any(axis=0), str(maps["boundary"].values) == "free")
     for ax, k in zip(panels.ravel(), shown, strict=False):
         cells = np.where(touching[k], pressure[k] * factor, np.nan)
@@ -108,17 +108,17 @@ def figure(campaign: xr.DataTree, maps: xr.Dataset, *, run: Sequence) -> Figure:
         )
         ax.set_title(_name_state(maps, k), loc="right", fontsize=8)
         ax.set(xlim=np.array(window) * side, ylim=np.array(window) * side)
-        ax.set(xlabel=f"x ({length_unit})", ylabel=f"y ({length_unit})", facecolor="0.8")
+        ax.set(xlabel=f"$x$ ({length_unit})", ylabel=f"$y$ ({length_unit})", facecolor="0.8")
         ax.label_outer()
     for ax in panels.ravel()[len(shown) :]:
         ax.remove()
     for ax in panels.ravel()[len(shown) - columns : (rows - 1) * columns]:
         ax.tick_params(labelbottom=True)
-        ax.set_xlabel(f"x ({length_unit})")
+        ax.set_xlabel(f"$x$ ({length_unit})")
     bar = fig.colorbar(image, ax=panels.ravel()[: len(shown)], shrink=0.9, pad=0.015, aspect=28, extend="both")
     bar.set_label(f"pressure ({unit})")
     ends = (-least, -least / 2, 0, most / 2, most)
-    bar.set_ticks(ends, labels=[f"{float(f'{value:.2g}'):g}" for value in ends])
+    bar.set_ticks(ends, labels=[format_number(float(f"{value:.2g}")) for value in ends])
     fig.suptitle(run_label(campaign, labels), fontsize="medium")
     return fig
 
@@ -140,5 +140,5 @@ def _name_state(maps, snapshot):
     if "force" in maps:
         return f"{name}, $F$ = {format_quantity(float(f'{float(maps.force[step]):.3g}'), 'N')}"
     load = format_number(float(f"{float(maps['reduced_pressure'][step]):.3g}"))
-    words = rf"$p^{{\ast}}$ = {load}, $A/A_0$ = {float(maps['contact_area_fraction'][step]):.2g}"
-    return words if name == "loading" else f"{name}, {words}"
+    area = format_number(float(f"{float(maps['contact_area_fraction'][step]):.2g}"))
+    return f"{'' if name == 'loading' else f'{name}, '}$p^{{\\ast}}$ = {load}\n$A/A_0$ = {area}"

@@ -228,6 +228,7 @@ def _draw_estimates(axes, shown, compared):
     from icha.analysis import common_loads
 
     bare = {truth.runs.contact[1:]: truth.runs.by_seed for _, truth in compared if not _energy(truth)}
+    single = sum(_energy(truth) > 0 for _, truth in compared) == 1
     for line, truth in compared:
         seed = next(iter(truth.stops))
         without = bare.get(line.runs.contact[1:], {}).get(seed)
@@ -241,7 +242,8 @@ def _draw_estimates(axes, shown, compared):
             at = states[0][inside]
             known = common_loads.interpolate(load, true, at, logarithmic=points is curves.area_points)
             ax.plot(at, 100 * (values[inside] / known - 1), color=colour, **_ESTIMATE)
-            ax.plot([], [], color=GREY, label="Ciavarella, from runs without adhesion", **_ESTIMATE)
+            named = colour if single else GREY
+            ax.plot([], [], color=named, label="Ciavarella, from runs without adhesion", **_ESTIMATE)
 
 
 def _estimate(bare, adhesive):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from icha.datasets import results
+from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.curves import (
     AREA_LABEL,
     PRESSURE_LABEL,
@@ -20,6 +21,7 @@ from icha.figures.curves import (
     study_curves,
 )
 from icha.figures.declaration import Campaign, Declaration, Inputs, TruthFigure
+from icha.figures.looks import ASPERITIES_NAME, MODEL_MARKERS, TRUTH_LINE, model_handle, surface_label
 from icha.figures.style import DASHES, in_style, new_panels
 from icha.support.input_files import read_columns
 
@@ -60,6 +62,10 @@ DECLARATION = Declaration(
 )
 
 
+# Largest number of surfaces that have their own columns of panels.
+_MOST_SURFACES = 3
+
+
 @in_style
 def figure(
     campaign: xr.DataTree,
@@ -69,56 +75,78 @@ def figure(
     boundary_elements: str | None = None,
     measurements: Sequence[Mapping[str, Any]] = (),
 ) -> Figure:
-    """Draw all runs of a study.
+    """Draw all runs of a study: area, and area over load; with several slopes of several surfaces, only the latter.
 
     Parameters
     ----------
     campaign : the campaign dataset.
-    tables : files of measured curves; the left panel shows only curves with a known rms slope.
+    tables : files of measured curves; panels of the area show only curves with a known rms slope.
     measurements : for each table, the values of `label`, `columns` (headings and factors), `load_unit`, `material` and
         `rms_slope`. The `load_unit` is the load divided by the reduced pressure. Unknown values are None.
     """
     curves = study_curves(campaign, study, boundary_elements)
     looks = curves.looks
-    # If colours distinguish surfaces and slopes, every material has a row of panels.
+    # If colours distinguish surfaces and slopes, every material has a row of panels, and every surface a column.
     own_rows = looks.by_place and len(looks.materials) > 1
-    if not own_rows:
+    if own_rows and curves.crosses:
+        curves = _with_one_shape_per_model(curves)
+    elif not own_rows:
         # Open markers do not hide each other where curves coincide.
         curves = study_curves(campaign, study, boundary_elements, mfc="none")
     rows = [[material] for material in looks.materials] if own_rows else [looks.materials]
-    fig, panels = new_panels(0.5 + 2.8 * len(rows), len(rows), sharex="col", sharey="col")
-    ratios = []
-    for (left, right), shown in zip(panels, rows, strict=True):
-        of_row = curves._replace(
-            lines=[line for line in curves.lines if line.runs.contact[0] in shown],
-            crosses=[line for line in curves.crosses if line.runs.contact[0] in shown],
-        )
-        *_, (_, drawn) = draw_curves(of_row, {left: _points_at_load, right: ratio_points}, unloading=True)
-        ratios.append(drawn)
-        left.set_ylabel(AREA_LABEL)
-        right.set_ylabel(RATIO_LABEL)
-        if own_rows:
-            right.set_title(looks.material_name(shown[0]), loc="right")
-    limit_ratios(panels[0, 1], np.concatenate(ratios))
-    left, right = panels[0]
-    for k, (table, known) in enumerate(zip(tables, measurements, strict=True)):
-        colour = looks.material_colour(known["material"])
-        _draw_measured(left, right, table, known, colour, DASHES[k % len(DASHES)])
-    panels[-1, 0].set_xlabel(r"relative load  $F/(E^{\ast}A_0)$")
-    panels[-1, 1].set_xlabel(PRESSURE_LABEL)
-    add_legend(fig, [left, right], curves)
+    columns = [(_area_at_load, None), (ratio_points, None)]
+    surfaces = list(dict.fromkeys(surface for surface, _ in looks.places))
+    if looks.slopes_per_surface and len(surfaces) <= _MOST_SURFACES:
+        columns = [(ratio_points, surface) for surface in surfaces]
+    fig, panels = new_panels(0.5 + 2.8 * len(rows), len(rows), len(columns), sharex="col")
+    for row, materials in zip(panels, rows, strict=True):
+        ratios = []
+        for ax, (points, surface) in zip(row, columns, strict=True):
+            of_panel = curves._replace(
+                lines=_select(curves.lines, materials, surface), crosses=_select(curves.crosses, materials, surface)
+            )
+            [(_, values)] = draw_curves(of_panel, {ax: points}, unloading=True, count=len(curves.lines))
+            for k, (table, known) in enumerate(zip(tables, measurements, strict=True)):
+                if known["material"] in (None, *materials):
+                    look = {"color": looks.material_colour(known["material"]), "ls": DASHES[k % len(DASHES)]}
+                    _draw_measured(ax, points, table, known, look)
+            words = [surface_label(campaign, surface)] if surface else []
+            words += [looks.material_name(materials[0])] if own_rows else []
+            ax.set_title(", ".join(words), loc="right", fontsize=8)
+            ax.set_ylabel(RATIO_LABEL if points is ratio_points else AREA_LABEL)
+            ratios += [values] if points is ratio_points else []
+        for ax in row[[points is ratio_points for points, _ in columns]]:
+            limit_ratios(ax, np.concatenate(ratios))
+    for ax, (points, _) in zip(panels[-1], columns, strict=True):
+        ax.set_xlabel(PRESSURE_LABEL if points is ratio_points else r"relative load  $F/(E^{\ast}A_0)$")
+    add_legend(fig, panels.ravel(), curves)
     return fig
 
 
-def _draw_measured(left, right, table, known, colour, dashes):
-    """Draw a measured curve in the right panel, and also in the left panel if the rms slope is known."""
+def _with_one_shape_per_model(curves):
+    """Return curves whose boundary elements all are upright crosses with a dashed line; the legend names the models."""
+    shape = {"marker": MODEL_MARKERS[SHORT_RANGE], "ls": TRUTH_LINE["ls"], "lw": 0.6}
+    handles = {ASPERITIES_NAME: model_handle(ASPERITIES_NAME, **{"ls": "-", "lw": 0.9} | curves.looks.fill())}
+    handles = curves.looks.colour_handles() | handles | {SHORT_RANGE: model_handle(SHORT_RANGE, **shape)}
+    return curves._replace(crosses=[each._replace(look=each.look | shape) for each in curves.crosses], handles=handles)
+
+
+def _select(curves, materials, surface):
+    """Return the curves of some materials, and of one surface or, if it is None, of all surfaces."""
+    contacts = [(curve, *curve.runs.contact) for curve in curves]
+    return [curve for curve, material, place, _ in contacts if material in materials and surface in (None, place)]
+
+
+def _draw_measured(ax, points, table, known, look):
+    """Draw a measured curve; on an axis of relative loads, only if the rms slope is known."""
     load, area = read_columns(table, known["columns"])
     pressure, slope = load / known["load_unit"], known["rms_slope"]
-    look = {"color": colour, "ls": dashes, "lw": 1.1, "zorder": 1}
-    right.plot(pressure, area / pressure, label=known["label"], **look)
-    if slope is not None:
-        left.plot(pressure * slope, area, **look)
+    look |= {"lw": 1.1, "zorder": 1, "label": known["label"]}
+    if points is ratio_points:
+        ax.plot(pressure, area / pressure, **look)
+    elif slope is not None:
+        ax.plot(pressure * slope, area, **look)
 
 
-def _points_at_load(run):
+def _area_at_load(run):
     return run["reduced_pressure"].values * float(run["rms_slope"]), run["contact_area_fraction"].values

@@ -68,8 +68,8 @@ def figure(
     for ax, kind in zip(panels, _KINDS, strict=True):
         _draw_slopes(ax, by_slope, kind, colours, length)
         ax.set_aspect("equal")
-        ax.set_xlabel(f"x ({unit})")
-    panels[0].set_ylabel(f"y ({unit})")
+        ax.set_xlabel(f"$x$ ({unit})")
+    panels[0].set_ylabel(f"$y$ ({unit})")
     names = {
         slope: slope_label(slope) + ("" if is_applicable(run) else f" ({NOT_APPLICABLE_ALONE})")
         for slope, run in by_slope.items()

@@ -48,7 +48,7 @@ class Topography(NamedTuple):
     def label(self, axes: Axes) -> None:
         """Set the limits and the labels of the x and y axes."""
         axes.set(xlim=(0, self.side), ylim=(0, self.side))
-        axes.set(xlabel=f"x ({self.length_unit})", ylabel=f"y ({self.length_unit})")
+        axes.set(xlabel=f"$x$ ({self.length_unit})", ylabel=f"$y$ ({self.length_unit})")
         axes.tick_params(direction="out", top=False, right=False)
 
 

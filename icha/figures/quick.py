@@ -55,7 +55,7 @@ def plot_contact(run: xr.Dataset, snapshot: int = -1, axes: Axes | None = None) 
         circles = EllipseCollection(2 * radius, 2 * radius, 0, units="xy", offsets=places, transOffset=axes.transData)
         axes.add_collection(circles)
         axes.set(xlim=(0, side * factor), ylim=(0, side * factor), aspect="equal")
-    axes.set(xlabel=f"x ({unit})", ylabel=f"y ({unit})")
+    axes.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})")
     return axes
 
 

@@ -269,38 +269,43 @@ def select_unloaded_runs(
     """
     from icha.datasets.campaign import unit_height
 
-    runs = _select_runs_with(unloading_legs, campaign, study, model)
+    runs = _select_runs_with(unloading_legs, campaign, study, [model, None, REFERENCE_MODEL])
     if not runs:
         raise NothingToDraw(f"study {study}: no run reached its unloading; `icha run` prints where the runs ended")
     return [(labels, run.assign(reduced_separation=run["mean_separation"] / unit_height(run))) for labels, run in runs]
 
 
-def _select_runs_with(condition, campaign, study, preferred=None):
-    """Return the runs of a preferred model that fulfil a condition; if none does, such runs of another model.
+def _select_runs_with(condition, campaign, study, models=(None, REFERENCE_MODEL)):
+    """Return the runs that fulfil a condition, of the first of some models that has such runs.
 
-    The default is the `shown_model`, then boundary elements. Near full contact, runs with asperities end before
-    unloading, but runs with boundary elements may unload.
+    None is the `shown_model` of the study. Near full contact, runs with asperities end before unloading, but runs with
+    boundary elements may unload.
     """
-    for model in (preferred, None, REFERENCE_MODEL):
+    for model in models:
         runs = select_runs(campaign, study, ragged=False, model=model)
         if found := [(labels, run) for labels, run in runs if condition(run)]:
             break
     return found
 
 
+def _has_separated(run):
+    return "hysteresis_loss" in run
+
+
 def select_detached_lines(
-    campaign: xr.DataTree, studies: Sequence[str], *, along_slopes: bool = False
-) -> dict[tuple[tuple[str, str, float | None], bool], list[ContactRuns]]:
+    campaign: xr.DataTree, studies: Sequence[str], *, along_slopes: bool = False, both_models: bool = False
+) -> dict[tuple[tuple[str, str, float | None], bool, str], list[ContactRuns]]:
     """Return the runs of some studies that were unloaded to complete separation, arranged as lines of points.
 
     Parameters
     ----------
     along_slopes : True if a line joins points at several rms slopes. If False, every rms slope has its own line.
+    both_models : True to add boundary elements to runs of another model.
 
     Returns
     -------
-    For each line, the runs at every point. A key has two parts: a tuple of material, surface and slope; and True if the
-    asperity model is applicable.
+    For each line, the runs at every point. A key has three parts: a tuple of material, surface and slope; True if the
+    asperity model is applicable; and the name of the model.
 
     Raises
     ------
@@ -309,10 +314,12 @@ def select_detached_lines(
     """
     found = {}
     for study in studies:
-        runs = _select_runs_with(lambda run: "hysteresis_loss" in run, campaign, study)
-        for point in group_by_contact(campaign, runs):
+        points = group_by_contact(campaign, _select_runs_with(_has_separated, campaign, study))
+        if both_models and points and points[0].labels.model != REFERENCE_MODEL:
+            points += group_by_contact(campaign, _select_runs_with(_has_separated, campaign, study, [REFERENCE_MODEL]))
+        for point in points:
             material, surface, slope = point.contact
-            line = (material, surface, None if along_slopes else slope), point.applicable
+            line = (material, surface, None if along_slopes else slope), point.applicable, point.labels.model
             found.setdefault(line, []).append(point)
     if studies and not found:
         raise NothingToDraw(f"studies {', '.join(studies)}: no run was unloaded to complete separation")

@@ -148,7 +148,7 @@ def format_number(value: float) -> str:
         return "0"
     exponent = int(np.floor(np.log10(abs(value)) + 1e-12))
     if -3 <= exponent <= 3:
-        return f"{value:.4g}"
+        return f"{value:.4g}".replace("-", "−")
     mantissa = f"{value / 10.0**exponent:.3g}"
     power = f"10^{{{exponent}}}"
     return f"${power}$" if mantissa == "1" else rf"${mantissa}\times{power}$"

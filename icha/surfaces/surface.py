@@ -142,7 +142,7 @@ class Surface:
         heights = (self.profile if self.shape else self.heights) * height
         image = axes.imshow(heights, origin="lower", extent=(0, side, 0, side), cmap="cividis")
         axes.figure.colorbar(image, ax=axes, label=f"height ({height_unit})")
-        axes.set(xlabel=f"x ({unit})", ylabel=f"y ({unit})")
+        axes.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})")
         return axes
 
     @property

@@ -382,7 +382,7 @@ def test_fig10_shows_means_and_seeds_of_the_errors_in_per_cent():
     # Three seeds are too few for a confidence interval: the bars are their range.
     for (_, low), (_, high) in bars[0].get_segments():
         assert (low, high) == pytest.approx((expected.min(), expected.max()))
-    assert "means, bars from least to largest, n = 3" in legend(left.figure)
+    assert "means, bars from smallest to largest, n = 3" in legend(left.figure)
     np.testing.assert_allclose(bare.get_ydata(), -20)
     np.testing.assert_allclose(right.containers[1][0].get_ydata(), 25)
     np.testing.assert_allclose(adhesive.get_xdata(), compared.PRESSURES, rtol=0.03)
@@ -672,10 +672,12 @@ def test_captions_state_only_what_the_figure_contains():
     tree = small.tree()
     bare = caption_of_fig2("slopes", campaign=tree)
     assert "Open shapes are without adhesion." in bare and "boundary elements" not in bare
-    assert "Lines are means" not in bare and "Thin dashed" not in bare and "theories" not in bare
+    assert "Lines and symbols are means" not in bare and "Thin dashed" not in bare and "theories" not in bare
     assert "Ratio of contact area and load (a)" in bare and "mean separation divided by rms height (b)" in bare
     seeds = caption_of_fig2("single", campaign=tree)
-    assert "Lines are means over the seeds" in seeds and "Pale thin lines" in seeds and "A band" not in seeds
+    assert (
+        "Lines and symbols are means over the seeds" in seeds and "Pale thin lines" in seeds and "A band" not in seeds
+    )
     both = caption_of_fig2("one", campaign=compared.tree_of_both())
     assert "Panels (c) and (d) show" in both and "Open shapes" in both and "three arms" not in both
     assert "three arms" in caption_of_fig2("one", campaign=compared.tree(), model_error=compared.errors())

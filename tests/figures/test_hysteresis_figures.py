@@ -63,13 +63,31 @@ def test_fig13_draws_loading_unloading_and_the_pull_off():
         x, y = (run[name].values for name in names)
         (solid,), (dashed,) = curves(axes)
         for line, steps in ((solid, slice(turn + 1)), (dashed, slice(turn, None))):
-            np.testing.assert_array_equal(line.get_data(), (x[steps], y[steps]))
+            drawn = np.array(line.get_data())
+            every = (drawn.shape[1] - 1) // (len(x[steps]) - 1)
+            np.testing.assert_array_equal(drawn[:, ::every], (x[steps], y[steps]))
         assert solid.get_color() == dashed.get_color()
         (pull_off,) = marks(axes)
         assert pull_off.get_xydata().tolist() == [[x[at], y[at]]]
     unit = float(run["contact_modulus"] * run["rms_slope"])
     assert -unit * run["reduced_pressure"].values[at] == pytest.approx(float(run["pull_off_pressure"]))
     assert {"loading", "unloading", "pull-off"} <= set(legend(figure))
+
+
+def test_fig13_follows_the_exact_law_between_distant_states():
+    contact = separate.Asperities(separate.MATERIALS["sticky"])
+    labels = RunLabels("one", "asperities", "rough", 1, 1.0, "sticky")
+    campaign = separate.tree([(labels, contact.run(0.5, points=6))])
+    (loading,), _ = curves(fig13_loops.figure(campaign, study="one").axes[0])
+    u, p = loading.get_data()
+    states = np.arange(0, len(u), 8)
+    # At a state, the pressure may jump.
+    between = np.repeat(np.diff(u[states]) != 0, 8) & (np.arange(len(u) - 1) % 8 > 0)
+    pressure = [contact.state(each, contact.jump_in > each)[0] for each in u[:-1] * contact.rms_height]
+    exact = np.array(pressure) / (contact.material.contact_modulus * contact.rms_slope)
+    chords = np.interp(np.arange(len(p)), states, p[states])
+    curve, straight = (np.linalg.norm((drawn[:-1] - exact)[between]) for drawn in (p, chords))
+    assert curve < 0.1 * straight
 
 
 def test_fig13_without_adhesion_has_no_hysteresis_and_rounding_is_no_pull_off():
@@ -97,7 +115,8 @@ def test_fig13_shows_one_surface_and_seed(tree):
     figure = fig13_loops.figure(tree, study="hard", seed=2)
     solid, dashed = curves(figure.axes[0])
     assert len(solid) == len(dashed) == 2
-    assert any(line.get_ydata()[-1] == run["reduced_pressure"].values[line.get_ydata().size - 1] for line in solid)
+    deepest = run["reduced_pressure"].values[np.flatnonzero(run["leg"].values == 0)[-1]]
+    assert any(line.get_ydata()[-1] == deepest for line in solid)
     assert len({line.get_color() for line in solid}) == 2
     assert figure.get_suptitle() == "asperities, rough, seed 2"
     with pytest.raises(ValueError, match="no complete run has seed 7; complete runs have seed 1, 2"):
@@ -168,7 +187,9 @@ def test_fig14_shows_means_and_scatter_over_the_seeds(tree):
     values = factor * np.array(
         [[float(separate.run("sticky", slope, seed, 0.5)[quantity]) for slope in slopes] for seed in (1, 2)]
     )
-    np.testing.assert_array_equal(sticky[0].get_xdata(), slopes)
+    # The points of both materials stand side by side.
+    apart = [line[0].get_xdata() / slopes for line in (sticky, bare)]
+    np.testing.assert_allclose(apart, [[1.1**-0.25] * 2, [1.1**0.25] * 2])
     np.testing.assert_allclose(sticky[0].get_ydata(), values.mean(axis=0))
     # Two seeds are too few for a confidence interval: the bars are their range.
     ranges = [segment[:, 1] for segment in sticky[2][0].get_segments()]
@@ -181,7 +202,8 @@ def test_fig14_shows_means_and_scatter_over_the_seeds(tree):
     states = np.array(
         [[[float(run["largest_reduced_pressure"]), factor * float(run[quantity])] for run in each] for each in runs]
     )
-    np.testing.assert_allclose(np.transpose(sticky[0].get_data()), sorted(states.mean(axis=1).tolist()))
+    loads, tensions = sticky[0].get_data()
+    np.testing.assert_allclose(np.transpose([loads / apart[0][0], tensions]), sorted(states.mean(axis=1).tolist()))
     assert np.all(bare[0].get_ydata() == 0)
     assert sticky[0].get_color() == left.containers[0][0].get_color() != bare[0].get_color()
     # Materials, the slope of (b), and the seeds.

@@ -30,7 +30,7 @@ def test_contact_is_drawn_for_both_models(model):
     surface = icha.SelfAffineSpectrum(100e-6, 40e-6, 25e-6, 0.8).realise(32, 1)
     run = icha.simulate(surface, small.MATERIALS["hertz"], icha.Path([1e-2]), model=model)
     axes = icha.plot_contact(run)
-    assert axes.get_xlabel() == "x (µm)" and axes.get_xlim()[1] == pytest.approx(100)
+    assert axes.get_xlabel() == "$x$ (µm)" and axes.get_xlim()[1] == pytest.approx(100)
     shown = axes.collections[0].get_offsets() if model == "asperities" else axes.images[0].get_array()
     assert len(shown) == (run.sizes["spot"] if model == "asperities" else 32)
 
