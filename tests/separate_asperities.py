@@ -60,7 +60,7 @@ class Asperities:
         with np.errstate(divide="ignore", invalid="ignore"):  # infinite at jump-off, 0/0 without force
             R = self.radius_of_curvature
             stiffness = np.nan_to_num(
-                self.law.force_derivative(a, R) / self.law.approach_derivative(a, R), posinf=np.inf
+                self.law.force_derivative(a, R) / self.law.approach_derivative(a, R), posinf=np.inf, neginf=-np.inf
             )
         values = (
             np.sum(self.law.force(a, self.radius_of_curvature)),

@@ -47,11 +47,13 @@ DECLARATION = Declaration(
 )
 
 # The axis is linear if the ratio of the largest to the smallest value is at most this number.
-_SPAN = 30.0
+_SPAN = 5.0
 _LINE = {"lw": 0.9, "ls": "-"}
 _TRUTH = {"lw": 0.8, "ls": (0, (3, 2))}
 # Points at the same slope or load are drawn side by side. The last and the first of many lines have nearly this ratio.
 _SPREAD = 1.1
+# Size of the markers, divided by the usual size, so that short bars are visible.
+_SMALLER = 0.7
 # Variable on the y axis.
 _Y = "pull_off_pressure"
 
@@ -88,7 +90,7 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
     panels[0].set(xlabel=r"rms slope  $h′_{\mathrm{rms}}$", xscale=scale)
     panels[0].set_xlim(slopes[0] / 1.25, slopes[-1] * 1.25)
     panels[0].set_xticks(slopes, [f"{slope:g}" for slope in slopes])
-    panels[0].minorticks_off()
+    panels[0].xaxis.minorticks_off()
     if by_load:
         panels[1].set_xlabel(r"largest reduced pressure  $F/(E^{\ast}h′_{\mathrm{rms}}A_0)$")
         if loads.min() > 0:
@@ -105,9 +107,17 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
 
 
 def _scale(ax, values):
-    """Set a linear y axis; if values span decades, set a logarithmic axis that is linear near zero."""
+    """Set a linear y axis; if values span much, a logarithmic axis, which is linear near zero if there are zeros."""
+    from matplotlib.ticker import LogLocator
+
     positive = drop_rounding_errors(values)
     if len(positive) and positive.max() > _SPAN * positive.min():
+        if len(positive) == np.isfinite(values).sum():
+            ax.set_yscale("log")
+            ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+            ax.yaxis.set_major_formatter("{x:g}")
+            ax.yaxis.set_minor_formatter("")
+            return
         least = 10.0 ** np.floor(np.log10(positive.min()))
         ax.set_yscale("symlog", linthresh=least, linscale=0.4)
         ax.set_ylim(-0.3 * least, 2 * positive.max())
