@@ -78,8 +78,11 @@ def problem_of(details: Mapping) -> Problem:
     location, value, kind = _without_tags(details["loc"]), details["input"], details["type"]
     context = details.get("ctx", {})
     if kind == "value_error":
+        reason = str(context["error"])
+        if isinstance(value, list) and location[0] in ("surfaces", "materials"):
+            reason = f"{reason}. To vary it, write `vary: {{{location[-1]}: […]}}` in a study"
         # The message for a whole section already contains keys and values.
-        return location, NOTHING if isinstance(value, Mapping | BaseModel) else value, str(context["error"])
+        return location, NOTHING if isinstance(value, Mapping | BaseModel) else value, reason
     if kind == "missing" and location[0] == "figures" and location[2:] == ("script",):
         reason = _reason_for_key("extra_forbidden", location[:-1])
         return location[:-1], NOTHING, f"{reason}; or a figure of your own with the key 'script'"
