@@ -121,14 +121,17 @@ def _curve(runs, look):
     return Curve(runs, {seed: select.path_steps(run) for seed, run in runs.by_seed.items()}, look)
 
 
-def cross_look(looks: Looks, contact: Contact, model: str = SHORT_RANGE) -> dict:
-    """Return arguments of `Axes.plot` for boundary elements: crosses in the colour of the material or surface."""
+def cross_look(looks: Looks, contact: Contact, model: str = SHORT_RANGE, shape: str | None = None) -> dict:
+    """Return arguments of `Axes.plot` for boundary elements: crosses in the colour of the material or surface.
+
+    `shape` is the marker of the first surface and slope, if it is not the usual one.
+    """
     colour, adhesive = looks.colour(contact), looks.adhesive(contact[0])
     # Crosses without adhesion are larger than crosses with adhesion, so that both are visible if they coincide.
     size = (8 if adhesive else 11) * (1 if len(looks.contacts) <= FEW_LINES else 0.7)
     look = {"color": colour, "mec": colour, "ms": size, "zorder": 6 + adhesive}
     rank = looks.rank(contact) if model == SHORT_RANGE else 0
-    marker = CROSSES[rank % len(CROSSES)] if rank else MODEL_MARKERS[model]
+    marker = CROSSES[rank % len(CROSSES)] if rank else shape or MODEL_MARKERS[model]
     return look | {"ls": "none", "marker": marker, "mew": 1.0}
 
 

@@ -209,7 +209,7 @@ def lines_handles(counts: Iterable[int]) -> dict[str, Line2D]:
     """Return the legend entries of lines that are means over `counts` seeds."""
     counts = list(counts)
     if len(counts) > MOST_SCATTERED and max(counts) < ENOUGH:
-        return _handles(counts, {"": {}, "mean over the seeds": {"lw": 0.9}})
+        return _handles(counts, {"": {}, "means over the seeds": {"ls": "none"}})
     band = {"alpha": 0.35, "lw": 6, "solid_capstyle": "butt"}
     return _handles(counts, {"mean and 95 % band": band, "single seeds beside their mean": _SEED_LINE})
 
@@ -217,7 +217,7 @@ def lines_handles(counts: Iterable[int]) -> dict[str, Line2D]:
 def points_handles(counts: Iterable[int]) -> dict[str, Line2D]:
     """Return the legend entries of points that are means over `counts` seeds."""
     bars = {"marker": "|", "ls": "none", "ms": 8}
-    return _handles(counts, {"means, bars 95 %": bars, "means, bars from smallest to largest": bars})
+    return _handles(counts, {"mean and 95 % interval": bars, "mean and range": bars})
 
 
 def _handles(counts, looks):

@@ -239,7 +239,7 @@ def _small_tensions(loops):
 
 def _handles(looks, loops, *, marked):
     """Return the legend entries by name; `marked` is True if markers distinguish the loops."""
-    handles = looks.handles(**_BRANCHES["unloading"], **({} if marked else {"marker": "none"}))
+    handles = looks.handles(lw=4, ls="-", **({} if marked else {"marker": "none"}))
     for branch, dashes in BRANCH_DASHES.items():
         handles[branch] = legend_handle(color=GREY, ls=dashes, **_BRANCHES[branch])
     if any(select.pull_off_step(loop.run) is not None for loop in loops):

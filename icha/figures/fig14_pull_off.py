@@ -14,7 +14,7 @@ from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.curves import cross_look, drop_rounding_errors
 from icha.figures.declaration import Campaign, Declaration, StudyFigure, problems_of_unloading
 from icha.figures.ensembles import Points, points_handles
-from icha.figures.looks import ASPERITIES_NAME, legend_below, looks_of_studies, model_handle
+from icha.figures.looks import ASPERITIES_NAME, UNLOADING_MARKERS, legend_below, looks_of_studies, model_handle
 from icha.figures.select import select_detached_lines
 from icha.figures.style import GREY, ONE_COLUMN, TWO_COLUMNS, in_style, logarithmic_axes, new_panels
 from icha.support.formatting import choose_unit
@@ -50,6 +50,8 @@ DECLARATION = Declaration(
 _SPAN = 5.0
 _LINE = {"lw": 0.9, "ls": "-"}
 _TRUTH = {"lw": 0.8, "ls": (0, (3, 2))}
+# Oblique crosses can be told from bars.
+_OBLIQUE = UNLOADING_MARKERS[SHORT_RANGE]
 # Points at the same slope or load are drawn side by side. The last and the first of many lines have nearly this ratio.
 _SPREAD = 1.1
 # Size of the markers, divided by the usual size, so that short bars are visible.
@@ -76,10 +78,10 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
     for ax, x, drawn in zip(panels, ("rms_slope", "largest_reduced_pressure"), (by_slope, by_load), strict=False):
         lines = {key: Points(line, x, _Y, factor=factor) for key, line in drawn.items()}
         for position, ((contact, applicable, model), line) in enumerate(lines.items()):
-            crosses = len(models) > 1 and model == REFERENCE_MODEL
-            look = (
-                cross_look(looks, contact) | _TRUTH if crosses else looks.look(contact, applicable=applicable) | _LINE
-            )
+            look = looks.look(contact, applicable=applicable) | _LINE
+            if len(models) > 1 and model == REFERENCE_MODEL:
+                look = cross_look(looks, contact, shape=_OBLIQUE) | _TRUTH
+            look["ms"] *= _SMALLER
             line.draw(ax, look, shift=_SPREAD ** ((position + 0.5) / len(lines) - 0.5))
             counts += line.counts
         loads, values = np.concatenate([line.means for line in lines.values()], axis=1)
@@ -98,8 +100,9 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
             panels[1].set_xlim(loads.min() / 1.6, loads.max() * 1.6)
     handles, words = looks.handles(**_LINE), [MODELS[model].words for model in models]
     if len(models) > 1:
+        handles = looks.colour_handles() if looks.by_place else handles
         handles |= {ASPERITIES_NAME: model_handle(ASPERITIES_NAME, **_LINE | looks.fill())}
-        handles |= {SHORT_RANGE: model_handle(SHORT_RANGE, **_TRUTH)}
+        handles |= {SHORT_RANGE: model_handle(SHORT_RANGE, marker=_OBLIQUE, **_TRUTH)}
         words = []
     panels[0].set_title(", ".join([*words, *filter(None, [looks.heading()])]), loc="right", fontsize=8)
     legend_below(fig, handles | points_handles(counts))

@@ -382,7 +382,7 @@ def test_fig10_shows_means_and_seeds_of_the_errors_in_per_cent():
     # Three seeds are too few for a confidence interval: the bars are their range.
     for (_, low), (_, high) in bars[0].get_segments():
         assert (low, high) == pytest.approx((expected.min(), expected.max()))
-    assert "means, bars from smallest to largest, n = 3" in legend(left.figure)
+    assert "mean and range, n = 3" in legend(left.figure)
     np.testing.assert_allclose(bare.get_ydata(), -20)
     np.testing.assert_allclose(right.containers[1][0].get_ydata(), 25)
     np.testing.assert_allclose(adhesive.get_xdata(), compared.PRESSURES, rtol=0.03)
@@ -601,6 +601,17 @@ def test_fig5_legend_has_the_markers_of_boundary_elements_that_are_drawn(alone):
         assert lines_of(figure.axes[0], marker)
 
 
+def test_fig5_has_a_panel_for_each_surface_and_material_with_many_slopes():
+    names, tree = two_surfaces((1.0, 0.5, 0.2, 0.1))
+    panels = fig5_multi_slope.figure(tree, study="vary").axes
+    assert [axes.get_title("right").split(",")[0] for axes in panels] == 2 * names
+    for axes in panels:
+        lines = [line for line in axes.get_lines() if len(line.get_xdata())]
+        assert len({line.get_color() for line in lines}) == len(lines) == 4
+    limits = [axes.get_ylim() for axes in panels]
+    assert limits[0] == limits[1] != limits[2] == limits[3]
+
+
 def test_fig5_distinguishes_surfaces():
     slopes = (1.0, 0.2)
     names, tree = two_surfaces(slopes)
@@ -710,7 +721,7 @@ def test_single_seeds_are_drawn_only_beside_few_curves(monkeypatch):
     monkeypatch.setattr(ensembles, "MOST_SCATTERED", 1)
     fig = fig2_area_and_gap.figure(tree, study="one")
     names = [text.get_text() for text in fig.legends[0].get_texts()]
-    assert not thin(fig) and "mean over the seeds, n = 3" in names
+    assert not thin(fig) and "means over the seeds, n = 3" in names
 
 
 def test_captions_name_the_units_and_the_models_that_are_drawn():

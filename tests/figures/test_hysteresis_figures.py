@@ -210,6 +210,17 @@ def test_fig14_shows_means_and_scatter_over_the_seeds(tree):
     assert len(legend(figure)) == 4
 
 
+def test_fig14_shows_boundary_elements_beside_asperities():
+    runs = separate.study("one", materials=("sticky",))
+    runs += [(labels._replace(model="boundary_elements"), run) for labels, run in runs]
+    figure = fig14_pull_off.figure(separate.tree(runs), study="one")
+    (asperities, *_), (truth, *_) = figure.axes[0].containers
+    assert (asperities.get_marker(), truth.get_marker()) == ("o", "x")
+    np.testing.assert_array_equal(asperities.get_ydata(), truth.get_ydata())
+    assert (truth.get_xdata() > asperities.get_xdata()).all()
+    assert {"asperities", "boundary elements"} < set(legend(figure))
+
+
 def test_fig14_shows_zero_and_values_that_span_decades():
     slopes = (1.0, 0.5, 0.2, 0.1)
     many = separate.tree(separate.study("one", slopes=slopes, materials=("sticky", "weak", "hertz"), seeds=(1,)))
