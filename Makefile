@@ -82,8 +82,9 @@ validation: tamaas
 	python -m validation.model_error
 	python -m validation.one_asperity
 
+# Some runs fail a check; docs/hysteresis.md states how many.
 hysteresis: environment
-	$(MAKE) run CONFIG=config/campaigns/hysteresis.yaml
+	-$(MAKE) run CONFIG=config/campaigns/hysteresis.yaml
 	python -m validation.hysteresis
 
 indenter: .venv-benchmarks/.installed
