@@ -138,7 +138,8 @@ def _name_state(maps, snapshot):
     pull_off = str(maps["snapshot_kind"].values[snapshot]) == "pull_off"
     name = "pull-off" if pull_off else str(maps["branch"].values[step])
     if "force" in maps:
-        return f"{name}, $F$ = {format_quantity(float(f'{float(maps.force[step]):.3g}'), 'N')}"
+        force = format_quantity(float(f"{float(maps['force'][step]):.3g}"), "N").replace("-", "−")
+        return f"{name}, $F$ = {force}"
     load = format_number(float(f"{float(maps['reduced_pressure'][step]):.3g}"))
     area = format_number(float(f"{float(maps['contact_area_fraction'][step]):.2g}"))
     return f"{'' if name == 'loading' else f'{name}, '}$p^{{\\ast}}$ = {load}\n$A/A_0$ = {area}"
