@@ -43,8 +43,8 @@ def texts_of(figure: Figure, data: Mapping[str, object], studies: Sequence[str])
     """Return all texts of a figure, and words for what no text of a figure tells, as lines.
 
     Words are the names of the `data`, and words for the `studies` that are shown: materials that are `bare`, `adhesive`
-    or `with and without adhesion`; `several surfaces`, `several slopes`, `one seed`, `periodic` surfaces; boundary
-    elements with which the model was compared, `in the limit` or `at finite range`.
+    or `with and without adhesion`; `several surfaces`, `several slopes`, with or without adhesion, `one seed`,
+    `periodic` surfaces; boundary elements with which the model was compared, `in the limit` or `at finite range`.
     """
     from matplotlib.text import Text
 
@@ -57,6 +57,8 @@ def texts_of(figure: Figure, data: Mapping[str, object], studies: Sequence[str])
             "with and without adhesion": (study["surface_energy"] == 0).any() and (study["surface_energy"] > 0).any(),
             "several surfaces": study.sizes["surface"] > 1,
             "several slopes": len(slopes_of(study)) > 1,
+            "bare at several slopes": (study["surface_energy"] == 0).any() and len(slopes_of(study)) > 1,
+            "adhesive at several slopes": (study["surface_energy"] > 0).any() and len(slopes_of(study)) > 1,
             "one seed": study.sizes["seed"] == 1,
             "periodic": (study["boundary"] == "periodic").any(),
         }

@@ -87,18 +87,21 @@ def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | Non
     """
     groups = select.group_by_contact(campaign, select.select_runs(campaign, study, ragged=False))
     dataset = campaign[study].to_dataset()
+    name, lines = model_name(dataset), []
+    other = boundary_elements or (study if name == ASPERITIES_NAME else None)
+    truths = select.select_runs(campaign, other, ragged=False, model=REFERENCE_MODEL) if other else []
+    grouped = select.group_by_contact(campaign, truths)
     materials = dataset["material"].values.tolist()
     contacts = sorted((group.contact for group in groups), key=lambda contact: materials.index(contact[0]))
-    looks = Looks(campaign, dataset, contacts)
-    name, lines = model_name(dataset), []
+    # There are only a few shapes of crosses. For more surfaces and slopes, colours distinguish surfaces and slopes.
+    with_crosses = bool(grouped) or name != ASPERITIES_NAME
+    by_place = with_crosses and len({contact[1:] for contact in contacts}) > len(CROSSES)
+    looks = Looks(campaign, dataset, contacts, by_place=by_place)
     for group in groups:
         look = looks.look(group.contact, applicable=group.applicable) | {"ls": "-" if looks.many else "none"} | changed
         if name != ASPERITIES_NAME:
             look |= {"marker": cross_look(looks, group.contact)["marker"], "ms": look["ms"] + 2}
         lines.append(_curve(group, look))
-    other = boundary_elements or (study if name == ASPERITIES_NAME else None)
-    truths = select.select_runs(campaign, other, ragged=False, model=REFERENCE_MODEL) if other else []
-    grouped = select.group_by_contact(campaign, truths)
     crosses = [_curve(truth, cross_look(looks, truth.contact)) for truth in grouped]
     changed |= {"ls": "-" if looks.many or any(len(group.by_seed) > 1 for group in groups) else "none"}
     if len(looks.materials if looks.by_place else looks.places) == 1:

@@ -171,7 +171,9 @@ def figure(
         ax.set_xlabel(gap.label)
     panels[-1, -1].set_xlabel(pressure.label)
     labels, _ = runs[0]
-    words = MODELS[labels.model].words, surface_label(campaign, labels.surface), f"seed {labels.seed}"
+    models = dict.fromkeys([labels.model, *(REFERENCE_MODEL for loop in drawn if loop.truths)])
+    words = " and ".join(MODELS[model].words for model in models), surface_label(campaign, labels.surface)
+    words = *words, f"seed {labels.seed}"
     fig.suptitle(", ".join(words), fontsize="medium")
     legend_below(fig, _handles(looks, drawn, marked=len(rows[0]) > 1), looks.heading())
     return fig

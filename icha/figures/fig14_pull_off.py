@@ -46,8 +46,9 @@ DECLARATION = Declaration(
     description="Pull-off pressure against rms slope, and against the largest load.", options=PullOffFigure
 )
 
-# The axis is linear if the ratio of the largest to the smallest value is at most this number.
-_SPAN = 5.0
+# The axis is linear if the ratio of the largest to the smallest positive value is at most this number, without and with
+# zeros.
+_SPAN, _SPAN_WITH_ZEROS = 5.0, 30.0
 _LINE = {"lw": 0.9, "ls": "-"}
 _TRUTH = {"lw": 0.8, "ls": (0, (3, 2))}
 # Oblique crosses can be told from bars.
@@ -69,8 +70,9 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
     points = list(itertools.chain(*by_slope.values(), *by_load.values()))
     if len({point.labels.rms_slope for point in points}) == 1:  # the same markers in both panels
         by_load = {((*contact[:2], None), *of): line for (contact, *of), line in by_load.items()}
-    looks = looks_of_studies(campaign, [study, *load_studies], [contact for contact, *_ in (*by_slope, *by_load)])
     models = {point.labels.model for point in points}
+    contacts = [contact for contact, *_ in (*by_slope, *by_load)]
+    looks = looks_of_studies(campaign, [study, *load_studies], contacts, crosses=len(models) > 1)
     factor, unit = choose_unit(max(float(run[_Y]) for point in points for run in point.by_seed.values()), "Pa")
 
     fig, [panels] = new_panels(2.9, columns=2 if by_load else 1, width=TWO_COLUMNS if by_load else ONE_COLUMN)
@@ -102,7 +104,11 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
     if len(models) > 1:
         handles = looks.colour_handles() if looks.by_place else handles
         handles |= {ASPERITIES_NAME: model_handle(ASPERITIES_NAME, **_LINE | looks.fill())}
-        handles |= {SHORT_RANGE: model_handle(SHORT_RANGE, marker=_OBLIQUE, **_TRUTH)}
+        crossed = [contact for contact, _, model in (*by_slope, *by_load) if model == REFERENCE_MODEL]
+        for contact in crossed:
+            look = {"marker": cross_look(looks, contact, shape=_OBLIQUE)["marker"]}
+            words = [SHORT_RANGE, *([looks.shape_name(contact)] if any(map(looks.rank, crossed)) else [])]
+            handles[", ".join(words)] = model_handle(SHORT_RANGE, **look | _TRUTH)
         words = []
     panels[0].set_title(", ".join([*words, *filter(None, [looks.heading()])]), loc="right", fontsize=8)
     legend_below(fig, handles | points_handles(counts))
@@ -114,13 +120,14 @@ def _scale(ax, values):
     from matplotlib.ticker import LogLocator
 
     positive = drop_rounding_errors(values)
-    if len(positive) and positive.max() > _SPAN * positive.min():
-        if len(positive) == np.isfinite(values).sum():
-            ax.set_yscale("log")
-            ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-            ax.yaxis.set_major_formatter("{x:g}")
-            ax.yaxis.set_minor_formatter("")
-            return
+    zeros = len(positive) < np.isfinite(values).sum()
+    if len(positive) and not zeros and positive.max() > _SPAN * positive.min():
+        ax.set_yscale("log")
+        ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        ax.yaxis.set_major_formatter("{x:g}")
+        ax.yaxis.set_minor_formatter("")
+        return
+    if len(positive) and positive.max() > _SPAN_WITH_ZEROS * positive.min():
         least = 10.0 ** np.floor(np.log10(positive.min()))
         ax.set_yscale("symlog", linthresh=least, linscale=0.4)
         ax.set_ylim(-0.3 * least, 2 * positive.max())

@@ -8,9 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from icha.contact.models import REFERENCE_MODEL
+from icha.datasets.variables.model_error import SHORT_RANGE
+from icha.figures.curves import cross_look
 from icha.figures.declaration import Campaign, Declaration, FigureOptions, problems_of_unloading
 from icha.figures.ensembles import Points, points_handles
-from icha.figures.looks import legend_below, looks_of_studies
+from icha.figures.looks import legend_below, looks_of_studies, model_handle
 from icha.figures.select import ContactRuns, NothingToDraw, name_models, select_detached_lines
 from icha.figures.style import GREY, in_style, logarithmic_axes, new_panels
 from icha.support.values import Problem, list_of_names
@@ -55,6 +58,8 @@ _FIT_POINTS = 100
 _SPAN = 30.0
 # A part of the loss is drawn if the magnitude of its share reaches this number in at least one bar.
 _LEAST_SHARE = 1e-6
+# Variables along x and y.
+_LOSS = ("largest_contact_area_fraction", "hysteresis_loss_over_surface_energy")
 # Opacity of the bars of runs for which the asperity model is not applicable.
 _PALE = 0.35
 
@@ -65,27 +70,40 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
     from matplotlib.patches import Patch
 
     studies = list(dict.fromkeys(studies))
-    runs = select_detached_lines(campaign, studies)
-    looks = looks_of_studies(campaign, studies, [contact for contact, *_ in runs])
-    sticky = {key: line for key, line in runs.items() if looks.adhesive(key[0][0])}
+    runs = select_detached_lines(campaign, studies, both_models=True)
+    sticky = {key: line for key, line in runs.items() if _is_adhesive(line)}
     if not sticky:
         raise NothingToDraw(f"studies {', '.join(studies)}: no run with adhesion; the figure needs a surface energy")
+    several = len({model for *_, model in sticky}) > 1
+    looks = looks_of_studies(campaign, studies, [contact for contact, *_ in sticky], crosses=several)
+    truths = {key: line for key, line in sticky.items() if several and key[-1] == REFERENCE_MODEL}
+    sticky = {key: line for key, line in sticky.items() if key not in truths}
 
     fig, [(loss, parts)] = new_panels(3.1, width_ratios=(1.25, 1))
-    handles, counts = _draw_losses(loss, sticky, looks)
-    name_models(loss, itertools.chain(*runs.values()))
+    handles, counts = _draw_losses(loss, sticky, truths, looks)
+    if truths:
+        handles |= {SHORT_RANGE: model_handle(SHORT_RANGE)}
+    else:
+        name_models(loss, itertools.chain(*sticky.values()))
     shown = _draw_parts(parts, sticky, looks)
     handles |= {PARTS[name][0]: Patch(ec="black", lw=0.5, **PARTS[name][1]) for name in shown}
     legend_below(fig, handles | points_handles(counts), looks.heading(), rows=looks.slopes_per_surface)
     return fig
 
 
-def _draw_losses(ax, runs, looks):
-    """Draw the losses of all lines with their fits; return the legend entries and the numbers of seeds."""
-    quantities = "largest_contact_area_fraction", "hysteresis_loss_over_surface_energy"
-    drawn = {key: Points(line, *quantities) for key, line in runs.items()}
+def _is_adhesive(line):
+    return float(next(iter(line[0].by_seed.values()))["surface_energy"]) > 0
+
+
+def _draw_losses(ax, runs, truths, looks):
+    """Draw the losses of runs with fits, and boundary elements; return legend entries and numbers of seeds."""
+    drawn = {key: Points(line, *_LOSS) for key, line in (runs | truths).items()}
     handles = looks.handles(ls="none") if looks.many else {}
-    for (contact, applicable, _), line in drawn.items():
+    for key, line in drawn.items():
+        contact, applicable, _ = key
+        if key in truths:
+            line.draw(ax, cross_look(looks, contact))
+            continue
         handle = line.draw(ax, looks.look(contact, applicable=applicable) | {"ls": "none"})
         if not applicable:
             continue
@@ -141,8 +159,8 @@ def _draw_parts(ax, runs, looks):
         look = looks.look(contact, applicable=applicable)
         ax.plot(position, -0.055, transform=ax.get_xaxis_transform(), clip_on=False, **look | {"ls": "none"})
     ax.axhline(0, color="black", lw=0.6)
-    ax.set(xlim=(-0.7, len(bars) - 0.3), ylabel="share of the loss (%)")
+    ax.set(xlim=(-0.7, len(bars) - 0.3), ylabel="share of losses and gains (%)")
     ax.set_xticks(range(len(bars)), [looks.place_name(tuple(place)) for (_, *place), *_ in bars], rotation=90)
     ax.tick_params("x", length=0, pad=14, labelsize=7)
-    ax.set_xlabel("lines of (a), at their largest load", labelpad=2)
+    ax.set_xlabel("series of (a), at their largest load", labelpad=2)
     return shown

@@ -176,8 +176,8 @@ def _finite_range_curves(model_error, study, looks):
 def _difference(line, truth, points):
     """Return loads, and for each seed the differences in per cent between a curve and boundary elements.
 
-    Loads of the curve outside the load range of boundary elements are left out. Values of boundary elements are
-    interpolated to the remaining loads.
+    Loads are those of the curve in the load range of boundary elements, and the largest load that both reach. Values of
+    both models are interpolated to these loads.
     """
     from icha.analysis.common_loads import at_common_loads, interpolate
 
@@ -188,10 +188,15 @@ def _difference(line, truth, points):
         if pressed.any():
             true_load, true_values = true_load[pressed], true_values[pressed]
             at = np.clip(load, true_load.min(), true_load.max())
-            reached = np.isclose(at, load, rtol=_SAME_LOAD, atol=0)
+            at = at[np.isclose(at, load, rtol=_SAME_LOAD, atol=0)]
+            largest = min(load.max(), true_load.max())
+            if at.size and not np.isclose(at.max(), largest, rtol=_SAME_LOAD, atol=0):
+                at = np.append(at, largest)
             logarithmic = points is curves.area_points
-            true_values = interpolate(true_load, true_values, at[reached], logarithmic=logarithmic)
-            members.append((load[reached], 100 * (values[reached] / true_values - 1)))
+            own, true = (
+                interpolate(*each, at, logarithmic=logarithmic) for each in ((load, values), (true_load, true_values))
+            )
+            members.append((at, 100 * (own / true - 1)))
     return at_common_loads(members, logarithmic=False) if members else (np.empty(0), np.empty((0, 0)))
 
 

@@ -253,13 +253,20 @@ def _symbol_and_value(name, values, k):
     return f"{_SYMBOLS.get(name, name.replace('_', ' '))} = {shown}"
 
 
-def looks_of_studies(campaign: xr.DataTree, studies: Sequence[str], contacts: Iterable[Contact]) -> Looks:
-    """Return the `Looks` for lines of some studies; with a single material, colours distinguish surfaces and slopes."""
+def looks_of_studies(
+    campaign: xr.DataTree, studies: Sequence[str], contacts: Iterable[Contact], *, crosses: bool = False
+) -> Looks:
+    """Return the `Looks` for lines of some studies.
+
+    With a single material, colours distinguish surfaces and slopes. If there are `crosses`, colours also do so for more
+    surfaces and slopes than there are shapes of crosses.
+    """
     import xarray as xr
 
     contacts = list(contacts)
     interfaces = xr.concat([campaign[study].to_dataset()[INTERFACE] for study in studies], "material")
     by_place = len({material for material, *_ in contacts}) == 1
+    by_place |= crosses and len({tuple(place) for _, *place in contacts}) > len(CROSSES)
     return Looks(campaign, interfaces.drop_duplicates("material"), contacts, by_place=by_place)
 
 

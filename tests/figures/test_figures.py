@@ -601,6 +601,30 @@ def test_fig5_legend_has_the_markers_of_boundary_elements_that_are_drawn(alone):
         assert lines_of(figure.axes[0], marker)
 
 
+def test_curves_of_boundary_elements_can_be_told_apart():
+    slopes = (1.0, 0.5, 0.2)
+    runs = [
+        (RunLabels("vary", "asperities", name, 1, slope, material), small.run(1 + k, slope, material).assign(seed=1))
+        for (k, name), slope, material in itertools.product(enumerate("ab"), slopes, ("soft", "hertz"))
+    ]
+    runs += [(labels._replace(model="boundary_elements"), compared.own_patches(run)) for labels, run in runs]
+    left, *_ = fig2_area_and_gap.figure(campaign_tree(runs), study="vary").axes
+    lines = [line for line in left.get_lines() if line.get_marker() != "None"]
+    looks = [(line.get_marker(), line.get_color(), line.get_markerfacecolor()) for line in lines]
+    assert len(looks) == len(set(looks)) == len(runs)
+
+
+def test_differences_end_at_the_largest_load_that_both_models_reach():
+    runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"][:1]
+    (labels, run), smaller = runs[0], 0.9
+    truth = compared.own_patches(run)
+    truth = truth.assign(reduced_pressure=smaller * truth["reduced_pressure"])
+    runs.append((labels._replace(model="boundary_elements"), truth))
+    panels = fig2_area_and_gap.figure(campaign_tree(runs), study="slopes").axes
+    drawn = [line.get_xdata() for line in panels[2].get_lines() if line.get_marker() == "o"]
+    assert max(map(max, drawn)) == pytest.approx(smaller * max(small.PRESSURES))
+
+
 def test_fig5_has_a_panel_for_each_surface_and_material_with_many_slopes():
     names, tree = two_surfaces((1.0, 0.5, 0.2, 0.1))
     panels = fig5_multi_slope.figure(tree, study="vary").axes
