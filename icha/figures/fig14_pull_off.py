@@ -54,7 +54,7 @@ _TRUTH = {"lw": 0.8, "ls": (0, (3, 2))}
 # Oblique crosses can be told from bars.
 _OBLIQUE = UNLOADING_MARKERS[SHORT_RANGE]
 # Points at the same slope or load are drawn side by side. The last and the first of many lines have nearly this ratio.
-_SPREAD = 1.1
+_SPREAD = 1.15
 # Size of the markers, divided by the usual size, so that short bars are visible.
 _SMALLER = 0.7
 # Variable on the y axis.

@@ -189,7 +189,7 @@ def test_fig14_shows_means_and_scatter_over_the_seeds(tree):
     )
     # The points of both materials stand side by side.
     apart = [line[0].get_xdata() / slopes for line in (sticky, bare)]
-    np.testing.assert_allclose(apart, [[1.1**-0.25] * 2, [1.1**0.25] * 2])
+    np.testing.assert_allclose(apart, [[1.15**-0.25] * 2, [1.15**0.25] * 2])
     np.testing.assert_allclose(sticky[0].get_ydata(), values.mean(axis=0))
     # Two seeds are too few for a confidence interval: the bars are their range.
     ranges = [segment[:, 1] for segment in sticky[2][0].get_segments()]
