@@ -79,7 +79,8 @@ def problem_of(details: Mapping) -> Problem:
     context = details.get("ctx", {})
     if kind == "value_error":
         reason = str(context["error"])
-        if isinstance(value, list) and location[0] in ("surfaces", "materials"):
+        numbers = isinstance(value, list) and reason.startswith("is not a number")
+        if numbers and location[0] in ("surfaces", "materials"):
             reason = f"{reason}. To vary it, write `vary: {{{location[-1]}: […]}}` in a study"
         # The message for a whole section already contains keys and values.
         return location, NOTHING if isinstance(value, Mapping | BaseModel) else value, reason
