@@ -43,22 +43,25 @@ def texts_of(figure: Figure, data: Mapping[str, object], studies: Sequence[str])
     """Return all texts of a figure, and words for what no text of a figure tells, as lines.
 
     Words are the names of the `data`, and words for the `studies` that are shown: materials that are `bare`, `adhesive`
-    or `with and without adhesion`; `several surfaces`, `several slopes`, with or without adhesion, `one seed`,
-    `periodic` surfaces; boundary elements with which the model was compared, `in the limit` or `at finite range`.
+    or `with and without adhesion`; `several surfaces`, `several slopes`, `bare at several slopes`, `adhesive at several
+    slopes`, `one seed`, `periodic` surfaces; boundary elements with which the model was compared, `in the limit` or `at
+    finite range`.
     """
     from matplotlib.text import Text
 
     words = [*data, *(text.get_text() for text in figure.findobj(Text))]
     campaign = data["campaign"].children if "campaign" in data else {}
     for study in (campaign[name].to_dataset() for name in studies if name in campaign):
+        bare, adhesive = (study["surface_energy"] == 0).any(), (study["surface_energy"] > 0).any()
+        several_slopes = len(slopes_of(study)) > 1
         conditions = {
-            "bare": (study["surface_energy"] == 0).any(),
-            "adhesive": (study["surface_energy"] > 0).any(),
-            "with and without adhesion": (study["surface_energy"] == 0).any() and (study["surface_energy"] > 0).any(),
+            "bare": bare,
+            "adhesive": adhesive,
+            "with and without adhesion": bare and adhesive,
             "several surfaces": study.sizes["surface"] > 1,
-            "several slopes": len(slopes_of(study)) > 1,
-            "bare at several slopes": (study["surface_energy"] == 0).any() and len(slopes_of(study)) > 1,
-            "adhesive at several slopes": (study["surface_energy"] > 0).any() and len(slopes_of(study)) > 1,
+            "several slopes": several_slopes,
+            "bare at several slopes": bare and several_slopes,
+            "adhesive at several slopes": adhesive and several_slopes,
             "one seed": study.sizes["seed"] == 1,
             "periodic": (study["boundary"] == "periodic").any(),
         }

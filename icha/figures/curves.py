@@ -93,10 +93,7 @@ def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | Non
     grouped = select.group_by_contact(campaign, truths)
     materials = dataset["material"].values.tolist()
     contacts = sorted((group.contact for group in groups), key=lambda contact: materials.index(contact[0]))
-    # There are only a few shapes of crosses. For more surfaces and slopes, colours distinguish surfaces and slopes.
-    with_crosses = bool(grouped) or name != ASPERITIES_NAME
-    by_place = with_crosses and len({contact[1:] for contact in contacts}) > len(CROSSES)
-    looks = Looks(campaign, dataset, contacts, by_place=by_place)
+    looks = Looks(campaign, dataset, contacts, crosses=bool(grouped) or name != ASPERITIES_NAME)
     for group in groups:
         look = looks.look(group.contact, applicable=group.applicable) | {"ls": "-" if looks.many else "none"} | changed
         if name != ASPERITIES_NAME:

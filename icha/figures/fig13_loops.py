@@ -31,7 +31,7 @@ from icha.figures.looks import (
     looks_of_studies,
     surface_label,
 )
-from icha.figures.style import GREY, in_style, legend_handle, new_panels, slope_label
+from icha.figures.style import GREY, format_number, in_style, legend_handle, new_panels, slope_label
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -69,7 +69,7 @@ _REACH = 1.4
 _APART = 0.025
 # Loading is a pale, wide line, so that it is visible where unloading coincides with it.
 _BRANCHES = {"loading": {"lw": 2.6, "alpha": 0.4}, "unloading": {"lw": 0.9}}
-# Number of points that are drawn between two states without an event in between.
+# Number of points that are drawn for each step of the path.
 _POINTS_BETWEEN = 8
 _PULL_OFF = {"ls": "none", "mec": "black", "mew": 0.7, "ms": 4.6, "zorder": 6}
 _TRUTH = {"ls": "none", "ms": 3.6, "mew": 0.7, "zorder": 5}
@@ -160,7 +160,7 @@ def figure(
             if window:
                 ax.set(xlim=window[0], ylim=window[1])
             exponent = min(int(np.floor(np.log10(ax.get_ylim()[1]))), 0)
-            ax.yaxis.set_major_formatter(lambda value, _, unit=10.0**exponent: f"{value / unit:.4g}".replace("-", "−"))
+            ax.yaxis.set_major_formatter(lambda value, _, unit=10.0**exponent: format_number(value / unit))
             times = rf"$10^{{{-exponent}}}\times$ " if exponent else ""
             ax.set_ylabel(times + pressure.label.partition("  ")[2])
         left.set_ylabel(pressure.label)
@@ -172,8 +172,8 @@ def figure(
     panels[-1, -1].set_xlabel(pressure.label)
     labels, _ = runs[0]
     models = dict.fromkeys([labels.model, *(REFERENCE_MODEL for loop in drawn if loop.truths)])
-    words = " and ".join(MODELS[model].words for model in models), surface_label(campaign, labels.surface)
-    words = *words, f"seed {labels.seed}"
+    title = " and ".join(MODELS[model].words for model in models)
+    words = title, surface_label(campaign, labels.surface), f"seed {labels.seed}"
     fig.suptitle(", ".join(words), fontsize="medium")
     legend_below(fig, _handles(looks, drawn, marked=len(rows[0]) > 1), looks.heading())
     return fig
@@ -208,7 +208,7 @@ def _draw(ax, loop, names, *, turn):
 
 
 def _curve(leg):
-    """Return separations and loads along a leg: between two states cubic, with events in between straight."""
+    """Return separations and loads along a leg: cubic between two states, or straight if an event lies between them."""
     separation, load, slope = leg["separation"].values, leg["load"].values, leg["slope"].values
     width, change = np.diff(separation)[:, None], np.diff(load)[:, None]
     t = np.linspace(0, 1, _POINTS_BETWEEN, endpoint=False)
@@ -217,6 +217,7 @@ def _curve(leg):
         start, end = (width * each[:, None] - change for each in (slope[:-1], slope[1:]))
         bulge = t * (1 - t) * ((1 - t) * start - t * end)
     smooth = np.all([np.diff(leg[f"{kind}_count"].values) == 0 for kind in EVENT_KINDS], axis=0)[:, None]
+    # A cubic polynomial that leaves the range of both loads by as much as they differ would not be the curve.
     bulge = np.where(smooth & (np.abs(bulge) <= np.abs(change)).all(axis=1, keepdims=True), bulge, 0.0)
     separations, loads = separation[:-1, None] + width * t, load[:-1, None] + change * t + bulge
     return np.append(separations, separation[-1]), np.append(loads, load[-1])

@@ -9,13 +9,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pydantic import Field
 
-from icha.contact.models import MODELS, REFERENCE_MODEL
+from icha.contact.models import REFERENCE_MODEL
 from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.curves import cross_look, drop_rounding_errors
 from icha.figures.declaration import Campaign, Declaration, StudyFigure, problems_of_unloading
 from icha.figures.ensembles import Points, points_handles
-from icha.figures.looks import ASPERITIES_NAME, UNLOADING_MARKERS, legend_below, looks_of_studies, model_handle
-from icha.figures.select import select_detached_lines
+from icha.figures.looks import (
+    ASPERITIES_NAME,
+    TRUTH_LINE,
+    UNLOADING_MARKERS,
+    legend_below,
+    looks_of_studies,
+    model_handle,
+)
+from icha.figures.select import names_of_models, select_detached_lines
 from icha.figures.style import GREY, ONE_COLUMN, TWO_COLUMNS, in_style, logarithmic_axes, new_panels
 from icha.support.formatting import choose_unit
 from icha.support.values import Problem, list_of_names
@@ -50,7 +57,7 @@ DECLARATION = Declaration(
 # zeros.
 _SPAN, _SPAN_WITH_ZEROS = 5.0, 30.0
 _LINE = {"lw": 0.9, "ls": "-"}
-_TRUTH = {"lw": 0.8, "ls": (0, (3, 2))}
+_TRUTH = {name: TRUTH_LINE[name] for name in ("lw", "ls")}
 # Oblique crosses can be told from bars.
 _OBLIQUE = UNLOADING_MARKERS[SHORT_RANGE]
 # Points at the same slope or load are drawn side by side. The last and the first of many lines have nearly this ratio.
@@ -70,7 +77,7 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
     points = list(itertools.chain(*by_slope.values(), *by_load.values()))
     if len({point.labels.rms_slope for point in points}) == 1:  # the same markers in both panels
         by_load = {((*contact[:2], None), *of): line for (contact, *of), line in by_load.items()}
-    models = {point.labels.model for point in points}
+    models = names_of_models(points)
     contacts = [contact for contact, *_ in (*by_slope, *by_load)]
     looks = looks_of_studies(campaign, [study, *load_studies], contacts, crosses=len(models) > 1)
     factor, unit = choose_unit(max(float(run[_Y]) for point in points for run in point.by_seed.values()), "Pa")
@@ -100,7 +107,7 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
         if loads.min() > 0:
             logarithmic_axes(panels[1], "x")
             panels[1].set_xlim(loads.min() / 1.6, loads.max() * 1.6)
-    handles, words = looks.handles(**_LINE), [MODELS[model].words for model in models]
+    handles = looks.handles(**_LINE)
     if len(models) > 1:
         handles = looks.colour_handles() if looks.by_place else handles
         handles |= {ASPERITIES_NAME: model_handle(ASPERITIES_NAME, **_LINE | looks.fill())}
@@ -109,8 +116,8 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
             look = {"marker": cross_look(looks, contact, shape=_OBLIQUE)["marker"]}
             words = [SHORT_RANGE, *([looks.shape_name(contact)] if any(map(looks.rank, crossed)) else [])]
             handles[", ".join(words)] = model_handle(SHORT_RANGE, **look | _TRUTH)
-        words = []
-    panels[0].set_title(", ".join([*words, *filter(None, [looks.heading()])]), loc="right", fontsize=8)
+    title = [models[0] if len(models) == 1 else None, looks.heading()]
+    panels[0].set_title(", ".join(filter(None, title)), loc="right", fontsize=8)
     legend_below(fig, handles | points_handles(counts))
     return fig
 

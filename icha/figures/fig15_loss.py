@@ -14,7 +14,7 @@ from icha.figures.curves import cross_look
 from icha.figures.declaration import Campaign, Declaration, FigureOptions, problems_of_unloading
 from icha.figures.ensembles import Points, points_handles
 from icha.figures.looks import legend_below, looks_of_studies, model_handle
-from icha.figures.select import ContactRuns, NothingToDraw, name_models, select_detached_lines
+from icha.figures.select import ContactRuns, NothingToDraw, names_of_models, select_detached_lines
 from icha.figures.style import GREY, in_style, logarithmic_axes, new_panels
 from icha.support.values import Problem, list_of_names
 
@@ -71,7 +71,7 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
 
     studies = list(dict.fromkeys(studies))
     runs = select_detached_lines(campaign, studies, both_models=True)
-    sticky = {key: line for key, line in runs.items() if _is_adhesive(line)}
+    sticky = {key: line for key, line in runs.items() if line[0].surface_energy > 0}
     if not sticky:
         raise NothingToDraw(f"studies {', '.join(studies)}: no run with adhesion; the figure needs a surface energy")
     several = len({model for *_, model in sticky}) > 1
@@ -84,15 +84,11 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
     if truths:
         handles |= {SHORT_RANGE: model_handle(SHORT_RANGE)}
     else:
-        name_models(loss, itertools.chain(*sticky.values()))
+        loss.set_title(", ".join(names_of_models(itertools.chain(*sticky.values()))), loc="right")
     shown = _draw_parts(parts, sticky, looks)
     handles |= {PARTS[name][0]: Patch(ec="black", lw=0.5, **PARTS[name][1]) for name in shown}
     legend_below(fig, handles | points_handles(counts), looks.heading(), rows=looks.slopes_per_surface)
     return fig
-
-
-def _is_adhesive(line):
-    return float(next(iter(line[0].by_seed.values()))["surface_energy"]) > 0
 
 
 def _draw_losses(ax, runs, truths, looks):

@@ -142,4 +142,5 @@ def _name_state(maps, snapshot):
         return f"{name}, $F$ = {force}"
     load = format_number(float(f"{float(maps['reduced_pressure'][step]):.3g}"))
     area = format_number(float(f"{float(maps['contact_area_fraction'][step]):.2g}"))
-    return f"{'' if name == 'loading' else f'{name}, '}$p^{{\\ast}}$ = {load}\n$A/A_0$ = {area}"
+    words = rf"$p^{{\ast}}$ = {load}" + f"\n$A/A_0$ = {area}"
+    return words if name == "loading" else f"{name}, {words}"

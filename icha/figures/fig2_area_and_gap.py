@@ -232,12 +232,14 @@ def _draw_estimates(axes, shown, compared):
     """Draw the difference between Ciavarella's estimate from boundary elements without adhesion, and those with it."""
     from icha.analysis import common_loads
 
-    bare = {truth.runs.contact[1:]: truth.runs.by_seed for _, truth in compared if not _energy(truth)}
-    single = sum(_energy(truth) > 0 for _, truth in compared) == 1
+    bare = {truth.runs.contact[1:]: truth.runs.by_seed for _, truth in compared if not truth.runs.surface_energy}
+    single = sum(truth.runs.surface_energy > 0 for _, truth in compared) == 1
     for line, truth in compared:
         seed = next(iter(truth.stops))
         without = bare.get(line.runs.contact[1:], {}).get(seed)
-        states = None if without is None or not _energy(truth) else _estimate(without, truth.runs.by_seed[seed])
+        states = (
+            None if without is None or not truth.runs.surface_energy else _estimate(without, truth.runs.by_seed[seed])
+        )
         if states is None:
             continue
         colour = shown.looks.material_colour(line.runs.labels.material)
@@ -266,10 +268,6 @@ def _estimate(bare, adhesive):
         states.area_fraction,
         states.separation / height,
     )
-
-
-def _energy(curve):
-    return float(next(iter(curve.runs.by_seed.values()))["surface_energy"])
 
 
 def _draw_separate_summits(left, right, references, dataset, looks):

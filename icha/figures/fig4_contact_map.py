@@ -93,7 +93,7 @@ def figure(
     draw_spots(whole, circles, facecolor=(*_RED, 0.85), lw=0, rasterized=len(circles) > _MANY_SPOTS)
     nodes, borders = _window(topography.heights, topography.side, corner, width)
     enlarged.imshow(nodes * topography.scale, extent=borders, origin="lower", interpolation="nearest", **heights)
-    draw_spots(enlarged, circles, facecolor="none" if beside else (*_RED, 0.4), edgecolor=_RED, lw=1.0)
+    draw_spots(enlarged, circles, facecolor=(*_RED, 0.4) if beside is None else "none", edgecolor=_RED, lw=1.0)
     area = rf"$A/A_0$ = {float(state['contact_area_fraction']):.3f}"
     whole.set_title(area if beside is None else f"asperities, {area}", loc="right")
     enlarged.set_title(f"enlarged ×{topography.side / width:.0f}", loc="right")

@@ -86,7 +86,7 @@ def figure(
     """
     curves = study_curves(campaign, study, boundary_elements)
     looks = curves.looks
-    # If colours distinguish surfaces and slopes, every material has a row of panels, and every surface a column.
+    # If colours distinguish surfaces and slopes, every material has a row of panels; a few surfaces have columns.
     own_rows = looks.by_place and len(looks.materials) > 1
     if own_rows and curves.crosses:
         curves = _with_one_shape_per_model(curves)
@@ -99,6 +99,9 @@ def figure(
     if looks.slopes_per_surface and len(surfaces) <= _MOST_SURFACES:
         columns = [(ratio_points, surface) for surface in surfaces]
     fig, panels = new_panels(0.5 + 2.8 * len(rows), len(rows), len(columns), sharex="col")
+    measured = [
+        (read_columns(table, known["columns"]), known) for table, known in zip(tables, measurements, strict=True)
+    ]
     for row, materials in zip(panels, rows, strict=True):
         ratios = []
         for ax, (points, surface) in zip(row, columns, strict=True):
@@ -106,10 +109,10 @@ def figure(
                 lines=_select(curves.lines, materials, surface), crosses=_select(curves.crosses, materials, surface)
             )
             [(_, values)] = draw_curves(of_panel, {ax: points}, unloading=True, count=len(curves.lines))
-            for k, (table, known) in enumerate(zip(tables, measurements, strict=True)):
+            for k, (curve, known) in enumerate(measured):
                 if known["material"] in (None, *materials):
                     look = {"color": looks.material_colour(known["material"]), "ls": DASHES[k % len(DASHES)]}
-                    _draw_measured(ax, points, table, known, look)
+                    _draw_measured(ax, points, *curve, known, look)
             words = [surface_label(campaign, surface)] if surface else []
             words += [looks.material_name(materials[0])] if own_rows else []
             ax.set_title(", ".join(words), loc="right", fontsize=8)
@@ -137,9 +140,8 @@ def _select(curves, materials, surface):
     return [curve for curve, material, place, _ in contacts if material in materials and surface in (None, place)]
 
 
-def _draw_measured(ax, points, table, known, look):
+def _draw_measured(ax, points, load, area, known, look):
     """Draw a measured curve; on an axis of relative loads, only if the rms slope is known."""
-    load, area = read_columns(table, known["columns"])
     pressure, slope = load / known["load_unit"], known["rms_slope"]
     look |= {"lw": 1.1, "zorder": 1, "label": known["label"]}
     if points is ratio_points:

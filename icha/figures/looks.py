@@ -74,10 +74,18 @@ class Looks:
     interfaces : modulus, surface energy and range of attraction of the materials.
     contacts : material, surface and rms slope of every line.
     by_place : True if colours distinguish places instead of materials; always True for more than `MOST_COLOURS` places.
+    crosses : True if boundary elements are drawn as crosses. Colours then distinguish places if there are more places
+        than shapes of crosses.
     """
 
     def __init__(
-        self, campaign: xr.DataTree, interfaces: xr.Dataset, contacts: Iterable[Contact], *, by_place: bool = False
+        self,
+        campaign: xr.DataTree,
+        interfaces: xr.Dataset,
+        contacts: Iterable[Contact],
+        *,
+        by_place=False,
+        crosses=False,
     ):
         """Assign colours and markers to the lines."""
         self._campaign = campaign
@@ -85,7 +93,8 @@ class Looks:
         self.interfaces = interfaces
         self.materials = list(dict.fromkeys(material for material, *_ in self.contacts))
         self.places = list(dict.fromkeys(tuple(place) for _, *place in self.contacts))
-        self.by_place = len(self.places) > MOST_COLOURS or (by_place and len(self.places) > 1)
+        self.by_place = len(self.places) > (len(CROSSES) if crosses else MOST_COLOURS)
+        self.by_place |= by_place and len(self.places) > 1
         coloured = self.places if self.by_place else self.materials
         self.many = len(coloured) > MOST_COLOURS
         graded = self.many or self.by_place
@@ -256,18 +265,13 @@ def _symbol_and_value(name, values, k):
 def looks_of_studies(
     campaign: xr.DataTree, studies: Sequence[str], contacts: Iterable[Contact], *, crosses: bool = False
 ) -> Looks:
-    """Return the `Looks` for lines of some studies.
-
-    With a single material, colours distinguish surfaces and slopes. If there are `crosses`, colours also do so for more
-    surfaces and slopes than there are shapes of crosses.
-    """
+    """Return the `Looks` for lines of some studies; with a single material, colours distinguish surfaces and slopes."""
     import xarray as xr
 
     contacts = list(contacts)
     interfaces = xr.concat([campaign[study].to_dataset()[INTERFACE] for study in studies], "material")
     by_place = len({material for material, *_ in contacts}) == 1
-    by_place |= crosses and len({tuple(place) for _, *place in contacts}) > len(CROSSES)
-    return Looks(campaign, interfaces.drop_duplicates("material"), contacts, by_place=by_place)
+    return Looks(campaign, interfaces.drop_duplicates("material"), contacts, by_place=by_place, crosses=crosses)
 
 
 def material_colours(campaign: xr.DataTree) -> dict[str, str]:

@@ -14,7 +14,6 @@ from icha.figures.style import format_number
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
 
 
 class NothingToDraw(ValueError):
@@ -43,6 +42,11 @@ class ContactRuns(NamedTuple):
     def contact(self) -> tuple[str, str, float]:
         """Material, surface and rms slope."""
         return self.labels.material, self.labels.surface, self.labels.rms_slope
+
+    @property
+    def surface_energy(self) -> float:
+        """Surface energy of the material, J/m^2."""
+        return float(next(iter(self.by_seed.values()))["surface_energy"])
 
 
 def group_by_contact(campaign: xr.DataTree, runs: Iterable[tuple[RunLabels, xr.Dataset]]) -> list[ContactRuns]:
@@ -335,7 +339,6 @@ def pull_off_step(run: xr.Dataset) -> int | None:
     return int(step) if pressure[step] < -ROUNDING * pressure.max() else None
 
 
-def name_models(axes: Axes, points: Iterable[ContactRuns]) -> None:
-    """Write the names of the models of some runs above a panel."""
-    models = dict.fromkeys(point.labels.model for point in points)
-    axes.set_title(", ".join(MODELS[model].words for model in models), loc="right")
+def names_of_models(points: Iterable[ContactRuns]) -> list[str]:
+    """Return the names of the models of some runs in legends and titles."""
+    return [MODELS[model].words for model in dict.fromkeys(point.labels.model for point in points)]

@@ -165,8 +165,9 @@ class EnergyBalance:
         2. In all other cases, each jump causes its reference loss. The rest of the loss is attributed to
            coalescence if the step has a coalescence or split; otherwise it is unattributed.
 
-        With error-controlled steps, jumps always cause the whole loss if the sum of the reference losses is not zero:
-        a jump may be far from the end of the step, where its reference loss is computed, so this is only an estimate.
+        With error-controlled steps, jumps cause the whole loss whenever the sum of the reference losses is not zero.
+        The reference losses only divide it among the jumps, because they are computed at the ends of the step, and a
+        jump may be far from there.
         """
         energy, kinds, united = step.events.energy, step.events.kind, step.unites_or_splits
         jump_in, jump_off = (float(energy[kinds == kind].sum()) / contact.area for kind in (JUMP_IN, JUMP_OFF))

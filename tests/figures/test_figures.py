@@ -578,12 +578,14 @@ def many(surfaces=9, materials=1):
     return campaign_tree(runs)
 
 
-def two_surfaces(slopes=(1.0,)):
+def two_surfaces(slopes=(1.0,), *, both_models=False):
     names = ["rough-hurst0.6", "rough-hurst0.9"]
     runs = [
         (RunLabels("vary", "asperities", name, 1, slope, material), small.run(1 + k, slope, material).assign(seed=1))
         for (k, name), slope, material in itertools.product(enumerate(names), slopes, ("soft", "hertz"))
     ]
+    if both_models:
+        runs += [(labels._replace(model="boundary_elements"), compared.own_patches(run)) for labels, run in runs]
     return names, campaign_tree(runs)
 
 
@@ -602,16 +604,11 @@ def test_fig5_legend_has_the_markers_of_boundary_elements_that_are_drawn(alone):
 
 
 def test_curves_of_boundary_elements_can_be_told_apart():
-    slopes = (1.0, 0.5, 0.2)
-    runs = [
-        (RunLabels("vary", "asperities", name, 1, slope, material), small.run(1 + k, slope, material).assign(seed=1))
-        for (k, name), slope, material in itertools.product(enumerate("ab"), slopes, ("soft", "hertz"))
-    ]
-    runs += [(labels._replace(model="boundary_elements"), compared.own_patches(run)) for labels, run in runs]
-    left, *_ = fig2_area_and_gap.figure(campaign_tree(runs), study="vary").axes
+    _, tree = two_surfaces((1.0, 0.5, 0.2), both_models=True)
+    left, *_ = fig2_area_and_gap.figure(tree, study="vary").axes
     lines = [line for line in left.get_lines() if line.get_marker() != "None"]
     looks = [(line.get_marker(), line.get_color(), line.get_markerfacecolor()) for line in lines]
-    assert len(looks) == len(set(looks)) == len(runs)
+    assert len(looks) == len(set(looks)) == 2 * 3 * 2 * 2, "surfaces, slopes, materials, models"
 
 
 def test_differences_end_at_the_largest_load_that_both_models_reach():
