@@ -232,20 +232,21 @@ class MeasuredSurface(_SurfaceFromFile):
     """A topography from a measurement."""
     path: File
     """Path of the topography file, relative to the configuration file."""
-    format: Literal["auto", "npy", "netcdf", "matrix", "xyz", "hdf5", "fourier", "instrument"] = "auto"
-    """Format of the file: `npy`; `netcdf`; `matrix` (text, a row of heights in each line); `xyz` (text, x y z in each
-    line, in any order); `hdf5`; `fourier` (text, qx qy Re Im in each line); `instrument` (a microscope's format that
-    SurfaceTopography can read). With `auto`, ICHA chooses the format by the ending of the file name and, for text, by
-    the number of columns."""
+    format: Literal["auto", "npy", "npz", "matlab", "netcdf", "matrix", "xyz", "hdf5", "fourier", "instrument"] = "auto"
+    """Format of the file: `npy`; `npz`; `matlab`; `netcdf`; `hdf5`; `matrix` (text, a row of heights in each line);
+    `xyz` (text, x y z in each line, in any order); `fourier` (text, qx qy Re Im in each line); `instrument` (a
+    microscope's format that SurfaceTopography can read). With `auto`, ICHA chooses the format by the content of the
+    file, the ending of its name and, for text, the number of columns."""
     columns: Annotated[list[integer(IntegerRange(1))], Field(min_length=3, max_length=3)] | None = None
     """Numbers (from 1) of the columns x, y and z of a text file, such as `[1, 2, 3]`. This key is required if
     the file has more than three columns."""
     data: Text | None = None
-    """Array or channel with the heights, if the file has several arrays or channels: name of the variable (netcdf),
-    path of the dataset (hdf5), or name of the channel (instrument). Default: the only array, or the default channel."""
+    """Array or channel with the heights, if the file has several arrays or channels: name of the array (npz, matlab) or
+    variable (netcdf), path of the dataset (hdf5), or name of the channel (instrument). Default: the only array, or the
+    default channel."""
     first_axis: Literal["y", "x"] = "y"
-    """First axis of the array in npy, netcdf, hdf5 and matrix files: `y` if each row of the array is a line along x,
-    else `x`. ICHA ignores this key if the dimensions in the file have the names x and y."""
+    """First axis of an array whose axes have no names (npy, npz, matlab, netcdf, hdf5, matrix): `y` if each row of the
+    array is a line along x, else `x`. ICHA refuses `x` for a file that states otherwise."""
     height_unit: UnitOfLength | None = None
     """Unit of the heights, such as `nm` or `0.1 mm`. Required for a file without this unit. The key replaces the
     unit in the file."""

@@ -335,28 +335,72 @@ LINES = {"height_unit": NM, "size": SIZE}
 
 
 def write_mat(path, **arrays):
-    """MATLAB's rows run along x, as SurfaceTopography reads them."""
-    savemat(path, {name: array.T for name, array in arrays.items()})
+    savemat(path, arrays)
 
 
 def write_npz(path, **arrays):
-    np.savez(path, **{name: array.T for name, array in arrays.items()})
+    np.savez(path, **arrays)
 
 
-@pytest.mark.parametrize(("name", "write"), [("scan.mat", write_mat), ("scan.npz", write_npz)])
+def write_new_mat(path, **arrays):
+    """MATLAB 7.3 stores the transpose of each array in HDF5."""
+    with h5py.File(path, "w") as file:
+        for name, array in arrays.items():
+            file[name] = array.T
+
+
+WRITERS = [("scan.mat", write_mat), ("scan.npz", write_npz), ("scan.mat", write_new_mat)]
+
+
+@pytest.mark.parametrize(("name", "write"), WRITERS)
 def test_of_several_arrays_one_must_be_named(tmp_path, name, write):
     path = tmp_path / name
-    write(path, Intensity=np.abs(HEIGHTS), Z=HEIGHTS, pixel=np.ones((1, 1)))
-    with refused("data", "the file has 2 arrays; expected one of: Intensity, Z"):
+    write(path, Intensity=np.abs(HEIGHTS), Z=HEIGHTS, pixel=np.ones((1, 1)), phase=1j * HEIGHTS)
+    with refused("data", r"the file has 2 real \w+s; expected one of: Intensity, Z"):
         scan(path, **LINES)
     read = scan(path, data="Z", **LINES)
     assert_read(read)
     assert read.data == "Z" and "data Z of several" in read.steps[0]
     # A single map among numbers needs no name.
     write(path, Z=HEIGHTS, a=np.ones((1, 1)))
-    read = scan(path, **LINES)
-    assert_read(read)
-    assert read.data == ""
+    for keys in ({}, {"data": "Z"}):
+        read = scan(path, **keys, **LINES)
+        assert_read(read)
+        assert read.data == ""
+
+
+@pytest.mark.parametrize(("name", "write"), WRITERS)
+def test_rows_run_along_x_unless_first_axis_says_otherwise(tmp_path, name, write):
+    """The same rule for all arrays whose axes have no names."""
+    write(tmp_path / name, Z=HEIGHTS)
+    assert_read(scan(tmp_path / name, **LINES))
+    write(tmp_path / name, Z=HEIGHTS.T)
+    assert_read(scan(tmp_path / name, first_axis="x", **LINES))
+
+
+def test_first_axis_against_the_file_is_refused(tmp_path):
+    assert_read(scan(write_netcdf(tmp_path / "turned.nc", turned=True), first_axis="x"))
+    with refused("first_axis", "the file states which of its axes is x"):
+        scan(write_netcdf(tmp_path / "scan.nc"), first_axis="x")
+    write_by_surface_topography(tmp_path / "other.nc")
+    with refused("first_axis", "the file states which of its axes is x"):
+        scan(tmp_path / "other.nc", format="instrument", first_axis="x")
+
+
+def test_arrays_of_matlab_that_are_no_heights(tmp_path):
+    """Structs contain maps; complex, logical and cell arrays, texts and axes are no maps."""
+    path = tmp_path / "scan.mat"
+    cell = np.empty((1, 2), object)
+    cell[:] = [[HEIGHTS, "text"]]
+    others = {"x": np.arange(COLUMNS), "y": np.arange(ROWS)[:, None], "name": "a scan", "mask": HEIGHTS > 0}
+    savemat(path, {"scan": {"Z": HEIGHTS, "unit": "nm"}, "phase": 1j * HEIGHTS, "cell": cell, **others})
+    assert_read(scan(path, **LINES))
+    assert_read(scan(path, data="scan/Z", **LINES))
+    savemat(path, {"Z": np.round(1e4 * HEIGHTS).astype("i4")})
+    assert_read(scan(path, height_unit=1e-4 * NM, size=SIZE))
+    savemat(path, {"phase": 1j * HEIGHTS, **others})
+    with refused("data", "has 2 real arrays; expected one of: x, y"):
+        scan(path, **LINES)
 
 
 @pytest.mark.parametrize("attribute", [True, False])
@@ -370,12 +414,15 @@ def test_new_files_of_matlab_are_the_right_way_round(tmp_path, attribute, block)
                 file[name].attrs["MATLAB_class"] = np.bytes_("double")
         file["title"] = np.frombuffer(b"a scan of mine", "u1").astype("u2").reshape(7, 2)
         file["title"].attrs["MATLAB_class"] = np.bytes_("char")
+        file["mask"] = (HEIGHTS.T > 0).astype("u1")
+        file["mask"].attrs["MATLAB_class"] = np.bytes_("logical")
+        file["#refs#/a"] = HEIGHTS.T
     if block:
         with path.open("r+b") as file:
             file.write(b"MATLAB 7.3 MAT-file")
     read = scan(path, **LINES)
     assert_read(read)
-    assert read.format == "hdf5"
+    assert read.format == "matlab"
 
 
 @pytest.mark.parametrize("name", ["scan.dat", "scan", "scan.hdf"])
@@ -388,6 +435,40 @@ def test_hdf5_is_known_by_its_signature(tmp_path, name):
 @pytest.mark.parametrize("name", ["scan.nc", "scan.cdf"])
 def test_leading_dimensions_of_one_entry_are_passed_over(tmp_path, name):
     assert_read(scan(write_netcdf(tmp_path / name, leading=("time",))))
+
+
+@pytest.mark.parametrize(
+    ("values", "size"),
+    [
+        (np.array([f"c{k}" for k in range(COLUMNS)], object), None),
+        (np.arange(COLUMNS), None),
+        (np.full(COLUMNS, np.nan), None),
+        (np.arange(COLUMNS) ** 2.0, "unequal steps"),
+        (np.where(np.arange(COLUMNS) == 3, np.nan, np.arange(COLUMNS)), "unequal steps"),
+        (np.r_[0, 2, 1, 3:COLUMNS], "unequal steps"),
+        (np.zeros(COLUMNS), "unequal steps"),
+    ],
+)
+def test_netcdf_coordinates_of_other_kinds(tmp_path, values, size):
+    """Text, indices and empty coordinates give no size; coordinates that are no grid are refused."""
+    with netCDF4.Dataset(tmp_path / "scan.nc", "w") as file:
+        file.createDimension("y", ROWS)
+        file.createDimension("x", COLUMNS)
+        file.createDimension("two", 2)
+        kind = str if values.dtype == object else values.dtype
+        file.createVariable("x", kind, ("x",))[:] = values
+        file.createVariable("y", "f8", ("y",))[:] = np.arange(ROWS)
+        file["y"].units = "seconds since 2026-01-01"
+        file.createVariable("x_bounds", "f8", ("x", "two"))[:] = 0.0
+        file.createVariable("z_of_text", str, ("y", "x"))
+        file.createVariable("surface", "f8", ("y", "x"))[:] = HEIGHTS
+    if size:
+        with refused("path", size):
+            scan(tmp_path / "scan.nc", **LINES)
+        return
+    assert_read(scan(tmp_path / "scan.nc", **LINES))
+    with refused("size", "is missing"):
+        scan(tmp_path / "scan.nc", height_unit=NM)
 
 
 @pytest.mark.parametrize("unit", ["px", "pixels", "pica", "point", "hand", "pt", "au", "pc", "li", "ly", "furlong"])

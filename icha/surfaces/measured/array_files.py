@@ -1,5 +1,6 @@
-"""Read arrays of heights from npy, netCDF and HDF5 files, and from formats that SurfaceTopography supports."""
+"""Read heights from NumPy, MATLAB, netCDF and HDF5 files, and from formats that SurfaceTopography supports."""
 
+import contextlib
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,11 +11,11 @@ import numpy as np
 from icha.support.input_files import require_room
 from icha.surfaces.measured.settings import (
     LINE_SCAN,
+    OFF_GRID,
     FileContent,
     Preparation,
     UnfitTopography,
     choose_name,
-    grid_indices,
     metres_of,
     put_y_first,
 )
@@ -26,8 +27,6 @@ _WITHOUT_SIGNATURE = ("hgt", "nms")
 # Formats that do not identify an instrument. SurfaceTopography reads any text with numbers as `asc`, and then drops
 # fields that are not numbers.
 _OF_ANY_TEXT = ("asc", *_WITHOUT_SIGNATURE)
-# Formats with several arrays and no default array.
-_ARRAYS = ("mat", "npz")
 _UNKNOWN = (
     "cannot be read as instrument: the file is damaged, or its format is not known here; expected another `format`, or "
     "an export of the heights as text"
@@ -41,6 +40,65 @@ def read_npy(file, settings: Preparation) -> FileContent:
         array = np.lib.format.open_memmap(file.path, mode="r")
     _require_room(array)
     return FileContent(put_y_first(np.array(array), settings))
+
+
+def read_npz(file, settings: Preparation) -> FileContent:
+    """Read heights from a NumPy archive: the array `settings.data`, else the only map."""
+    arrays = {}
+    with np.load(file.path) as archive:
+        require_room(_COPIES * sum(member.file_size for member in archive.zip.infolist()))
+        for name in archive.files:
+            with contextlib.suppress(ValueError):  # objects of Python, which are not read
+                arrays[name] = archive[name]
+    return _choose_array(arrays, settings)
+
+
+def read_matlab(file, settings: Preparation) -> FileContent:
+    """Read heights from a MATLAB file: `settings.data`, such as `Z` or `scan/Z` in a struct, else the only map.
+
+    Files of MATLAB 7.3 or later are HDF5 files.
+    """
+    import h5py
+    import scipy.io
+
+    if h5py.is_hdf5(file.path):
+        return read_hdf5(file, settings)
+
+    arrays = {}
+
+    def add(name, value):
+        if getattr(value, "dtype", np.dtype(object)).names and value.size == 1:
+            for field in value.dtype.names:
+                add(f"{name}/{field}", value[field].item())
+        elif isinstance(value, np.ndarray):
+            arrays[name] = value
+
+    # SciPy reads logical values as integers.
+    names = [name for name, _, kind in scipy.io.whosmat(file.path) if kind != "logical"]
+    for name, value in scipy.io.loadmat(file.path, variable_names=names).items():
+        add(name, value)
+    return _choose_array(arrays, settings)
+
+
+def _choose_array(arrays: Mapping[str, np.ndarray], settings) -> FileContent:
+    """Return the content of a file with several arrays: the array `settings.data`, or the only map of real numbers."""
+    real = {name: array for name, array in arrays.items() if array.dtype.kind in "iuf"}
+    name, data = _choose_map({name: array.shape for name, array in real.items()}, settings, "real array")
+    heights = real[name]
+    return FileContent(put_y_first(heights.reshape(heights.shape[-2:]), settings), data=data)
+
+
+def _choose_map(shapes: Mapping[str, tuple[int, ...]], settings, what: str, usual=()) -> tuple[str, str]:
+    """Return the name of the array to read, and the name to report ("" if the file has only one map)."""
+    maps = sorted(find_maps(shapes))
+    asked = (settings.data or "").strip("/")
+    if asked in shapes and not _is_map(shapes[asked]):
+        raise UnfitTopography(
+            "data",
+            f"has {len(shapes[asked])} dimensions; expected two, as in {', '.join(maps) or f'no {what} of this file'}",
+        )
+    name = asked if asked in shapes else choose_name(asked or None, maps, usual, what)
+    return name, name if len(maps) > 1 else ""
 
 
 def _read_variable(variable) -> np.ndarray:
@@ -59,15 +117,9 @@ def read_netcdf(source, settings: Preparation) -> FileContent:
     import netCDF4
 
     with netCDF4.Dataset(source.path) as file:
-        maps = find_maps({name: variable.shape for name, variable in file.variables.items()})
-        asked = settings.data if settings.data in file.variables else None
-        name = asked or choose_name(settings.data, maps, ("height", "heights", "z"), "variable")
+        shapes = {name: each.shape for name, each in file.variables.items() if _is_real(each)}
+        name, data = _choose_map(shapes, settings, "variable", ("height", "heights", "z"))
         chosen = file[name]
-        if not _is_map(chosen.shape):
-            raise UnfitTopography(
-                "data",
-                f"has {chosen.ndim} dimensions; expected two, as in {', '.join(maps) or 'no variable of this file'}",
-            )
         heights = _read_variable(chosen)
         heights = heights.reshape(heights.shape[-2:])
         dimensions, sides = chosen.dimensions[-2:], []
@@ -77,24 +129,37 @@ def read_netcdf(source, settings: Preparation) -> FileContent:
             heights = np.flip(heights, axis) if decreases else heights
         unit = _unit_of(chosen.__dict__)
     axes = [dimension.lower() for dimension in dimensions]
-    x_first = axes[0] == "x" if set(axes) == {"x", "y"} else settings.first_axis == "x"
+    if axes == ["y", "x"]:
+        _refuse_first_axis(settings)
+    x_first = settings.first_axis == "x" or axes == ["x", "y"]
     size = tuple(sides if x_first else sides[::-1]) if all(sides) else None
-    return FileContent(heights.T if x_first else heights, unit, size, data=name if len(maps) > 1 else "")
+    return FileContent(heights.T if x_first else heights, unit, size, data=data)
+
+
+def _is_real(variable) -> bool:
+    """Return whether a netCDF variable contains real numbers, and not text or compound values."""
+    return getattr(variable.dtype, "kind", "O") in "iuf"
+
+
+def _refuse_first_axis(settings):
+    """Raise UnfitTopography for `first_axis: x` if the file itself states which axis is x."""
+    if settings.first_axis == "x":
+        raise UnfitTopography("first_axis", "is x, but the file states which of its axes is x. Remove the key")
 
 
 def _side(coordinate, count):
     """Return the length of a side, m (None if unknown), and whether the coordinate along this side decreases."""
-    if coordinate is None or coordinate.ndim != 1:
+    if coordinate is None or coordinate.ndim != 1 or not _is_real(coordinate):
         return None, False
     unit, values = _unit_of(coordinate.__dict__), _read_variable(coordinate)
     if unit is not None and "length" in coordinate.__dict__:
         return float(coordinate.length) * unit, False
-    if count < 2:
+    if count < 2 or not np.isfinite(values).any():
         return None, False
-    _, lines, step = grid_indices(values, coordinate.name)
-    if lines != count:
+    step = (values[-1] - values[0]) / (count - 1)
+    if not np.max(np.abs(values - values[0] - step * np.arange(count))) <= OFF_GRID * abs(step) > 0:
         raise UnfitTopography("path", f"has coordinates {coordinate.name} with unequal steps; expected equal steps")
-    return (count * step * unit if unit is not None else None), values[0] > values[-1]
+    return (count * abs(step) * unit if unit is not None else None), step < 0
 
 
 def read_hdf5(source, settings: Preparation) -> FileContent:
@@ -108,21 +173,20 @@ def read_hdf5(source, settings: Preparation) -> FileContent:
         shapes = {}
 
         def add(name, node):
-            is_array = isinstance(node, h5py.Dataset) and node.dtype.kind in "iuf" and _is_map(node.shape)
-            if is_array and node.attrs.get("MATLAB_class") != b"char":
-                shapes[name] = node.shape
+            # MATLAB marks text and logical values, and keeps the content of cell arrays in groups such as `#refs#`.
+            if isinstance(node, h5py.Dataset) and node.dtype.kind in "iuf" and not name.startswith("#"):
+                if node.attrs.get("MATLAB_class") not in (b"char", b"logical"):
+                    shapes[name] = node.shape
 
         file.visititems(add)
-        maps = sorted(find_maps(shapes))
-        asked = settings.data.strip("/") if settings.data else None
-        name = asked if asked and asked in shapes else choose_name(asked, maps, (), "dataset")
+        name, data = _choose_map(shapes, settings, "real dataset")
         chosen = file[name]
         _require_room(chosen)
         heights = _unpack(chosen).reshape(chosen.shape[-2:])
         if source.path.suffix.lower() == ".mat" or "MATLAB_class" in chosen.attrs:
             heights = heights.T
         unit = _unit_of(chosen.attrs)
-    return FileContent(put_y_first(heights, settings), unit, data=name if len(maps) > 1 else "")
+    return FileContent(put_y_first(heights, settings), unit, data=data)
 
 
 def _unpack(dataset):
@@ -138,16 +202,27 @@ def _unpack(dataset):
     return np.where(missing, np.nan, stored * scale + offset)
 
 
-def format_of_hdf5(path: Path) -> str | None:
-    """Return the format of an HDF5 file: "netcdf", "hdf5", or "instrument" for Zygo files; None for other files."""
+def format_of_binary(path: Path) -> str | None:
+    """Return the format of a file of arrays by its content; None for text and for formats of instruments.
+
+    Zygo files are HDF5 files too, and so are MATLAB files since version 7.3.
+    """
     import h5py
 
-    if not h5py.is_hdf5(path):
-        return None
-    with h5py.File(path) as file:
-        if "_NCProperties" in file.attrs:
-            return "netcdf"
-        return "instrument" if "MetaData" in file else "hdf5"
+    suffix = path.suffix.lower()
+    if h5py.is_hdf5(path):
+        with h5py.File(path) as file:
+            if "_NCProperties" in file.attrs or suffix in (".nc", ".nc4"):
+                return "netcdf"
+            if "MetaData" in file:
+                return "instrument"
+            return "matlab" if suffix == ".mat" else "hdf5"
+    with path.open("rb") as file:
+        start = file.read(20)
+    by_start = {b"\x93NUMPY": "npy", b"CDF": "netcdf", b"MATLAB 5.0 MAT-file": "matlab"}
+    by_suffix = {".nc": "netcdf", ".nc4": "netcdf", ".h5": "hdf5", ".hdf5": "hdf5", ".mat": "matlab", ".npz": "npz"}
+    found = next((name for signature, name in by_start.items() if start.startswith(signature)), None)
+    return found or (by_suffix | {".npy": "npy"}).get(suffix)
 
 
 def _is_map(shape):
@@ -195,10 +270,13 @@ def is_instrument_text(file) -> bool:
 def read_instrument(file, settings: Preparation) -> FileContent:
     """Read heights, unit and size from the file of an instrument with SurfaceTopography."""
     opened = file.instrument
+    if opened is not None and opened.format() in ("mat", "npz"):
+        return (read_matlab if opened.format() == "mat" else read_npz)(file, settings)
     if opened is None or (
         opened.format() in _WITHOUT_SIGNATURE and file.path.suffix.lower()[1:] not in opened.file_extensions()
     ):
         raise UnfitTopography("path", _UNKNOWN)
+    _refuse_first_axis(settings)
     channel, data = _choose_channel(opened, settings)
     sized = channel.physical_sizes is not None
     topography = channel.topography(**({} if sized else {"physical_sizes": (1.0, 1.0)}))
@@ -218,9 +296,6 @@ def _choose_channel(opened, settings):
     maps = find_maps({k: tuple(channel.nb_grid_pts) for k, channel in enumerate(channels)})
     if settings.data is not None:
         channel = channels[names.index(choose_name(settings.data, names, (), "channel"))]
-    elif opened.format() in _ARRAYS and maps:
-        # Files with several arrays have no default array; the first array may not contain heights.
-        channel = channels[names.index(choose_name(None, [names[k] for k in maps], (), "array"))]
     else:
         channel = opened.default_channel
     if channel.dim != 2:

@@ -10,13 +10,23 @@ from icha.support import formatting
 from icha.support.formatting import printable
 from icha.support.input_files import RefusedFile, bounded_memory, problem_with_path, refuse_traps
 from icha.support.rules import LENGTH
-from icha.surfaces.measured.array_files import format_of_hdf5, read_hdf5, read_instrument, read_netcdf, read_npy
+from icha.surfaces.measured.array_files import (
+    format_of_binary,
+    read_hdf5,
+    read_instrument,
+    read_matlab,
+    read_netcdf,
+    read_npy,
+    read_npz,
+)
 from icha.surfaces.measured.settings import LINE_SCAN, Preparation, UnfitTopography
 from icha.surfaces.measured.text_files import format_of_text, read_fourier, read_matrix, read_xyz
 from icha.surfaces.measured.text_tables import SourceFile, first_damaged_line
 
 READERS = {
     "npy": read_npy,
+    "npz": read_npz,
+    "matlab": read_matlab,
     "netcdf": read_netcdf,
     "matrix": read_matrix,
     "xyz": read_xyz,
@@ -25,7 +35,13 @@ READERS = {
     "instrument": read_instrument,
 }
 # Libraries of the readers. They are imported before the memory is limited, so their own memory does not count.
-_LIBRARIES = {"netcdf": "netCDF4", "hdf5": "h5py", "instrument": "SurfaceTopography"}
+_LIBRARIES = {
+    "npz": "numpy",
+    "matlab": "scipy.io",
+    "netcdf": "netCDF4",
+    "hdf5": "h5py",
+    "instrument": "SurfaceTopography",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,11 +188,7 @@ def _read(path, settings):
 
 
 def _guess_format(path: Path) -> str:
-    """Guess the format of a file by its name or, for HDF5, by its content; return "text" for other files."""
-    suffix = Path(path.name.lower().removesuffix(".gz")).suffix
-    known = {".npy": "npy", ".nc": "netcdf", ".nc4": "netcdf", ".h5": "hdf5", ".hdf5": "hdf5", ".xyz": "xyz"}
-    if suffix in known:
-        return known[suffix]
-    if (hdf5 := format_of_hdf5(path)) is not None:
-        return hdf5
-    return "text"
+    """Guess the format of a file by its content and the ending of its name; return "text" for other files."""
+    if Path(path.name.lower().removesuffix(".gz")).suffix == ".xyz":
+        return "xyz"
+    return format_of_binary(path) or "text"

@@ -15,7 +15,7 @@ LINE_SCAN = "is a line scan, one profile of {} points; expected a topography, wi
 # Coordinates count as equal if their difference, divided by the range of the coordinates, is at most this value.
 _ROUNDING = 1e-6
 # Largest distance of a coordinate from its grid line, divided by the distance of the grid lines.
-_OFF_GRID = 0.05
+OFF_GRID = 0.05
 
 
 class UnfitTopography(ValueError):
@@ -116,7 +116,7 @@ def grid_indices(values: np.ndarray, axis: str) -> tuple[np.ndarray, int, float]
         count = len(steps) + 1 if np.max(steps) < 1.5 * usual else int(np.rint((high - low) / usual)) + 1
         step = (high - low) / (count - 1)
         index = np.rint((values - low) / step)
-        if count <= GRID.most and np.max(np.abs(values - low - index * step)) <= _OFF_GRID * step:
+        if count <= GRID.most and np.max(np.abs(values - low - index * step)) <= OFF_GRID * step:
             return index.astype(int), count, step
     raise UnfitTopography(
         "scattered",
