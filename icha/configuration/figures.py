@@ -7,7 +7,7 @@ from typing import Annotated, Any, Self
 from pydantic import ConfigDict, Field, create_model, model_validator
 
 from icha.figures.declaration import FigureOptions
-from icha.figures.own_figure import OwnFigure, caption_in
+from icha.figures.own_figure import OwnFigure, caption_in, modules_of
 from icha.figures.registry import DECLARATIONS, figure_number
 from icha.support.values import File, Name, Positive, Problem, Section, Text, conversion_factor, unknown
 
@@ -98,6 +98,7 @@ class _Drawn(Section):
         for name, own in self.model_extra.items():
             try:
                 caption_in(own.script)
+                modules_of(own.script)
             except ValueError as error:
                 yield ("figures", name, "script"), own.script, str(error)
             if figure_number(name):

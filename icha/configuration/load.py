@@ -34,6 +34,7 @@ from icha.configuration.yaml_files import (
     read_yaml,
 )
 from icha.datasets.results import CHOSEN_LEVELS
+from icha.figures.own_figure import modules_of
 from icha.support.values import NAME_PATTERN, NOTHING, Problem
 
 
@@ -180,6 +181,13 @@ def _key_of_path(section: str) -> str:
     return "script" if section == "figures" else "path"
 
 
+def _files_of(section: str, path: str) -> dict[str, str]:
+    """Return a file that a configuration names, and the modules of a script, by path below the folder of the file."""
+    modules = modules_of(path) if section == "figures" else ()
+    folder = Path(path).resolve().parent
+    return {Path(path).name: path} | {file.relative_to(folder).as_posix(): str(file) for file in modules}
+
+
 def _files_outside(campaign: Campaign, folder: str | os.PathLike) -> list[Problem]:
     """Return a problem for each of a campaign's files that lies outside a folder; links are resolved first."""
     return [
@@ -215,10 +223,11 @@ def collect_inputs(configuration: Configuration) -> tuple[str, dict[str, str]]:
     used = {("surfaces", campaign.origin("surfaces", name)) for name in surfaces}
     files = {}
     for (section, name), path in named.items():
-        stored = str(PurePosixPath(INPUTS, section, name, Path(path).name))
-        content[section][name] = (content[section][name] or {}) | {_key_of_path(section): stored}
+        folder = PurePosixPath(INPUTS, section, name)
+        stored = {str(folder / place): file for place, file in _files_of(section, path).items()}
+        content[section][name] = (content[section][name] or {}) | {_key_of_path(section): next(iter(stored))}
         if section != "surfaces" or (section, name) in used:
-            files[stored] = path
+            files |= stored
     # Every surface from a file now has its own path, so the path is removed from the defaults.
     (content.get("defaults") or {}).get("surfaces", {}).pop("path", None)
     return dump_yaml(content, configuration.origin), files

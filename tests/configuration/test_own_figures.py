@@ -1,12 +1,13 @@
 """Figures of the user's own: what a script draws, and scripts that cannot draw."""
 
 import re
+import sys
 
 import pytest
 import small_campaign as small
 
 from icha.datasets.campaign_file import write_campaign
-from icha.figures.own_figure import OwnFigure
+from icha.figures.own_figure import OwnFigure, modules_of
 from icha.figures.registry import draw_figure
 
 AREAS = '''
@@ -48,6 +49,24 @@ def test_a_script_draws_a_figure_with_its_docstring_as_caption(draw, tmp_path):
     assert not list(tmp_path.glob("__pycache__"))
 
 
+def test_a_script_imports_modules_beside_it(draw, tmp_path):
+    (tmp_path / "labels.py").write_text("from plots.units import AREA\n")
+    (tmp_path / "plots").mkdir()
+    (tmp_path / "plots/__init__.py").write_text("")
+    (tmp_path / "plots/units.py").write_text("from . import more\nAREA = 'area'\n")
+    (tmp_path / "plots/more.py").write_text("import numpy\n")
+    (tmp_path / "unused.py").write_text("not Python")
+    text = AREAS.replace("    return figure", "    import labels\n    axes.set_ylabel(labels.AREA)\n    return figure")
+    png, *_ = draw(text)
+    first = png.read_bytes()
+    names = ["labels.py", "plots/__init__.py", "plots/more.py", "plots/units.py"]
+    assert modules_of(tmp_path / "mine.py") == [tmp_path / name for name in names]
+    (tmp_path / "plots/units.py").write_text("from . import more\nAREA = 'A'\n")
+    draw(text)
+    assert png.read_bytes() != first, "the changed module is used"
+    assert not list(tmp_path.rglob("__pycache__")) and str(tmp_path) not in sys.path
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -74,6 +93,13 @@ def test_scripts_are_refused_before_anything_is_computed(load, text, message, tm
     if text is not None:
         (tmp_path / "mine.py").write_text(text)
     with pytest.raises(ValueError, match=f"figures.mine.script: .* {re.escape(message)}"):
+        load({"figures": {"mine": {"study": "one", "script": "mine.py"}}})
+
+
+def test_a_module_that_is_not_python_is_refused(load, tmp_path):
+    (tmp_path / "mine.py").write_text(f"import labels\n{AREAS}")
+    (tmp_path / "labels.py").write_text("AREA = \n")
+    with pytest.raises(ValueError, match=r"figures.mine.script: .* is not a Python file: .*labels.py, line 1"):
         load({"figures": {"mine": {"study": "one", "script": "mine.py"}}})
 
 

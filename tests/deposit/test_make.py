@@ -393,7 +393,8 @@ def test_files_are_stored_with_the_configuration(tmp_path):
     np.savetxt(tmp_path / "scan.txt", np.round(1e9 * small.surface().heights, 3))
     np.savetxt(tmp_path / "sub/scan.txt", np.round(2e9 * small.surface().heights.T, 3))
     (tmp_path / "areas.csv").write_text("p,a\n0.001,0.3\n")
-    (tmp_path / "spots.py").write_text(SPOTS)
+    (tmp_path / "spots.py").write_text(f"import labels\n{SPOTS}")
+    (tmp_path / "labels.py").write_text("SPOTS = 'spots'\n")
     campaign["figures"]["spots"]["script"] = "spots.py"
     campaign["measurements"]["lab"]["path"] = str(tmp_path / "areas.csv")
     (tmp_path / "asked.yaml").write_text(yaml.safe_dump(campaign))
@@ -401,6 +402,7 @@ def test_files_are_stored_with_the_configuration(tmp_path):
     text, files = collect_inputs(asked)
     assert str(tmp_path) not in text and "nobody" not in text
     places = (
+        "figures/spots/labels.py",
         "figures/spots/spots.py",
         "measurements/lab/areas.csv",
         "surfaces/one/scan.txt",
@@ -409,7 +411,7 @@ def test_files_are_stored_with_the_configuration(tmp_path):
     assert sorted(files) == [f"inputs/{place}" for place in places]
     kept = tmp_path / "kept"
     for place, file in files.items():
-        (kept / place).parent.mkdir(parents=True)
+        (kept / place).parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(file, kept / place)
     (kept / "config.used.yaml").write_text(text)
     again = load_configuration(kept / "config.used.yaml")

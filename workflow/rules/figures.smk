@@ -2,6 +2,7 @@
 # declares the inputs and the arguments (icha/figures/fig*.py).
 
 from icha.datasets.results import ResultFiles
+from icha.figures.own_figure import modules_of
 from icha.figures.registry import declaration_of, module_name
 from icha.planning.requirements import figure_memory
 from icha.support.checksums import sha256_of
@@ -14,9 +15,13 @@ FIGURE_INPUTS = {
 }
 
 
-# Files of the user that a figure needs: tables of measurements, and the script of an own figure.
+# Files of the user that a figure needs: tables of measurements, and the script of an own figure with its modules.
 GIVEN_FILES = {
-    name: [*inputs.get("tables", ()), *filter(None, [inputs.get("script")])] for name, inputs in FIGURE_INPUTS.items()
+    name: [
+        *inputs.get("tables", ()),
+        *(file for script in filter(None, [inputs.get("script")]) for file in (script, *modules_of(script))),
+    ]
+    for name, inputs in FIGURE_INPUTS.items()
 }
 
 
