@@ -32,8 +32,8 @@ from icha.contact.model import (
 from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets.attributes import COMPUTED, file_attributes
 from icha.datasets.build import bin_values, build_dataset, concatenate_rows, describe_variables, get_values, stack_rows
-from icha.datasets.variables.run import CYCLE, FURTHER, INDENTER, LOOP, RUN
-from icha.datasets.variables.terms import MATERIAL, ROUGHNESS, Table
+from icha.datasets.variables.run import CYCLE, FURTHER, INDENTER, LOOP, OF_MODELS, RUN
+from icha.datasets.variables.terms import MATERIAL, ROUGHNESS, Table, is_refused
 from icha.half_space.layer import softness_of
 from icha.path.energy_balance import Waypoint, summarise_loop
 from icha.path.follow import follow
@@ -208,7 +208,9 @@ def _dataset(surface, material, path, name, seed, record, summits, reasons, of_c
     of_contact : values that are the same in all states.
     """
     table = RUN | FURTHER[name]
+    nodes = np.arange(surface.grid) * surface.spacing
     values = {
+        **{axis: nodes for axis in ("x", "y") if axis in table},
         **_path_values(table, path, record, surface.grid),
         **_indenter_values(surface, record.steps),
         **_surface_values(surface, material, seed),
@@ -405,12 +407,11 @@ def _record_path(contact, observables, path, reachable, progress) -> _PathRecord
 
 
 def _require_finite(values: dict) -> dict:
-    """Return the values; raise `NotConverged` if a value is not finite. Only a stiffness may be infinite."""
+    """Return the values; raise `NotConverged` if a value is neither finite nor of a variable that may be infinite."""
+    table = RUN | OF_MODELS | INDENTER
     for name, value in values.items():
         numbers = np.asarray(value)
-        if name in ("contact_stiffness", "stiffness") and np.isposinf(numbers).all():
-            continue
-        if numbers.dtype.kind == "f" and not np.isfinite(numbers).all():
+        if numbers.dtype.kind == "f" and is_refused(numbers, table[name].further if name in table else {}).any():
             raise NotConverged(f"with values of {name} that are not finite")
     return values
 

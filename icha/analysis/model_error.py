@@ -21,6 +21,7 @@ from icha.datasets.campaign import find_snapshot, loading_stops, select_run, spo
 from icha.datasets.labels import LABELS, RunLabels, SolutionLabels, arrange_slopes, labels_at, place_of, slope_dims
 from icha.datasets.variables.campaign import COMPLETE, INCOMPLETE, NOT_IN_DESIGN, RAGGED, STATUS
 from icha.datasets.variables.model_error import ASKED, BINS, FINITE_RANGE, MODEL_ERROR, SHORT_RANGE
+from icha.datasets.variables.run import CELLS
 from icha.datasets.variables.terms import MATERIAL, Variable
 from icha.equilibrium.distributions import cover_grid
 from icha.path.targets import REDUCED_PRESSURE
@@ -202,8 +203,8 @@ def _as_solution(run, step, load):
     state = run.drop_dims([*RAGGED, "snapshot"], errors="ignore").isel(step=step)
     snapshot = snapshot_if_any(run, REDUCED_PRESSURE, load)
     if snapshot is not None:
-        contact = run["contact_map"].isel(snapshot=snapshot).rename(row="y", column="x") >= _HALF
-        state = state_of(run, snapshot).assign(contact=contact)
+        contact = run["contact_map"].isel(snapshot=snapshot).transpose("row", "column").values >= _HALF
+        state = state_of(run, snapshot).drop_dims(CELLS).assign(contact=(("y", "x"), contact))
     area = state["contact_area_fraction"]
     return state.assign(
         contact_area_fraction_raw=area,

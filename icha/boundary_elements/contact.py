@@ -172,8 +172,11 @@ class BoundaryElements(FullContactProblem):
 
     def gap(self, state: CellState) -> np.ndarray:
         """Return the gap at the grid nodes, (n, n), m; in partial cells it is the extension of the bond."""
-        displaced = self.space.displacement(state.cells, state.pressure / self.contact_modulus)
-        return self.crop(displaced * self.spacing + state.separation - self.heights)
+        return self.displacement(state) + state.separation - self.crop(self.heights)
+
+    def displacement(self, state: CellState) -> np.ndarray:
+        """Return the displacement of the elastic surface at the grid nodes, (n, n), m, away from the rough surface."""
+        return self.crop(self.space.displacement(state.cells, state.pressure / self.contact_modulus) * self.spacing)
 
     def crop(self, field: np.ndarray) -> np.ndarray:
         """Return a field of the grid without the margin of a free square."""

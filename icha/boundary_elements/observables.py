@@ -66,9 +66,8 @@ class PatchObservables:
         return reduced * contact.space.layer.uniform_compliance * contact.spacing
 
     def of_snapshot(self, state: CellState) -> dict:
-        """Return the distributions of gap and pressure, properties of each patch, and maps of contact and pressure."""
-        areas = self.contact.area_of_cells(state)
-        gap = self._gap_density(state, areas)
+        """Return the distributions of gap and pressure, properties of each patch, and maps of the cells."""
+        areas, gap = self.contact.area_of_cells(state), self.contact.gap(state)
         pressure, mean = self._pressure_density(state, areas)
 
         def field(*values):
@@ -77,11 +76,13 @@ class PatchObservables:
         return {
             "overlap_fraction": 0.0,
             "area_beyond_edges": 0.0,
-            "gap_density": gap,
+            "gap_density": self._gap_density(gap, state, areas),
             "pressure_density": pressure,
             "pressure_bin_mean": mean,
             "contact_map": field(state.cells, state.fraction, np.float32),
             "contact_pressure": field(state.cells, state.pressure, np.float32),
+            "gap_map": np.maximum(gap, 0.0).astype(np.float32),
+            "displacement_map": self.contact.displacement(state).astype(np.float32),
             **self._patches(state, areas),
         }
 
@@ -93,10 +94,10 @@ class PatchObservables:
             return []
         return [f"about {cells:.2g} grid cells for the shortest waves (at least {LEAST_CELLS_PER_WAVE:g} expected)"]
 
-    def _gap_density(self, state, areas):
+    def _gap_density(self, gap, state, areas):
         """Return the probability density of the gap outside contact; its integral plus the area fraction is one."""
         edges_of_bins = gap_bins(self.surface)
-        gap = np.clip(self.contact.gap(state), 0.0, edges_of_bins[-1])
+        gap = np.clip(gap, 0.0, edges_of_bins[-1])
         outside = 1 - self.contact.crop(self.contact.space.field(state.cells, areas))
         content, _ = np.histogram(gap, edges_of_bins, weights=outside)
         return content / gap.size / np.diff(edges_of_bins)

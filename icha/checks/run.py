@@ -25,7 +25,9 @@ CELL_LIMIT = 1e-3
 # Largest rise of the mean separation, in h_rms, in a step in which spots unite. After a union, the same load may need a
 # larger separation.
 SEPARATION_RISE_LIMIT = 1e-2
-_MAY_BE_INFINITE = {name for name, description in (RUN | INDENTER).items() if INFINITE in description.further}
+_MAY_BE_INFINITE = {
+    name for name, description in (RUN | OF_MODELS | INDENTER).items() if INFINITE in description.further
+}
 
 # Meanings of the checks by name.
 _CHECKS = LOOP_CHECKS | {

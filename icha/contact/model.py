@@ -205,11 +205,12 @@ class Observables(Protocol):
 
 # Edges of the bins of gap and pressure, the same for every model. The last bin includes all larger values. Gaps are in
 # h_rms: the first bin starts at zero, and then there are 20 bins per decade. Pressures are in E* h'_rms: the bins
-# have equal width from -1 to 5, and there are 20 bins per decade in the tails. The tail of tension is long because the
-# distribution of JKR pressures falls as |p|^-3.
+# have equal width from -1 to 5, and there are 20 bins per decade in the tails, up to 500 in magnitude. The first bin
+# includes all lower pressures: at the edge of a JKR spot the pressure is minus infinity, and the density falls as
+# |p|^-3.
 GAPS_PER_DECADE = 20
 GAP_BINS = np.concatenate([[0.0], np.logspace(-4, 1.5, 111)])
-PRESSURE_BINS = np.concatenate([-np.logspace(8, 0, 161)[:-1], np.linspace(-1, 5, 301), 5 * np.logspace(0, 2, 41)[1:]])
+PRESSURE_BINS = np.concatenate([-np.logspace(2.7, 0, 55)[:-1], np.linspace(-1, 5, 301), 5 * np.logspace(0, 2, 41)[1:]])
 
 
 def gap_bins(surface: Surface) -> np.ndarray:

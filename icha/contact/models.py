@@ -163,6 +163,14 @@ MODELS = {
             ),
             "contact_map": (_MAP, "1", "part of the cell that is in contact", "float32"),
             "contact_pressure": (_MAP, "Pa", "pressure in the cell, negative in tension", "float32"),
+            "gap_map": (_MAP, "m", "gap at the node; in partly closed cells, extension of the bond", "float32"),
+            "displacement_map": (
+                _MAP,
+                "m",
+                "displacement of the surface of the elastic body at the node by the pressure, positive away from the "
+                "rough surface; on a periodic surface, without its mean",
+                "float32",
+            ),
         },
         stiffness_error=1e-4,
         by_cells=True,

@@ -20,7 +20,7 @@ import xarray as xr
 from icha.datasets.results import COMPRESSED_SIZES, COMPRESSION, LEFT_IN_FILE
 from icha.datasets.variables.campaign import COMPLETE
 from icha.datasets.variables.run import CELLS
-from icha.datasets.variables.terms import INFINITE
+from icha.datasets.variables.terms import is_refused
 from icha.support.atomic_files import whole_file
 
 FLOAT_FILL = 9.969209968386869e36
@@ -205,12 +205,6 @@ def define_variable(
     variable.set_auto_maskandscale(False)
     variable.set_auto_chartostring(False)
     return variable
-
-
-def is_refused(values: np.ndarray, attrs: Mapping[str, object]) -> np.ndarray:
-    """Return True for values of a variable that are not finite, except infinite values that `attrs` allow."""
-    refused = ~np.isfinite(values)
-    return refused & ~np.isposinf(values) if INFINITE in attrs else refused
 
 
 def not_finite(name: Hashable, dims: tuple[Hashable, ...], bad: np.ndarray) -> str:

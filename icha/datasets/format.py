@@ -12,12 +12,12 @@ import numpy as np
 import xarray as xr
 
 from icha.contact.models import MODELS
-from icha.datasets.files import has_groups, is_refused, read_campaign, read_dataset
+from icha.datasets.files import has_groups, read_campaign, read_dataset
 from icha.datasets.labels import LABELS
 from icha.datasets.variables import run as of_run
 from icha.datasets.variables.campaign import CAMPAIGN as CAMPAIGN_TABLE
 from icha.datasets.variables.surface import TABLES as SURFACE_TABLES
-from icha.datasets.variables.terms import Table
+from icha.datasets.variables.terms import Table, is_refused
 from icha.support.input_files import bounded_memory, most_memory, problem_with_path, refuse_traps, require_room
 
 RUN, SURFACE, CAMPAIGN = "run dataset", "surface file", "campaign dataset"
@@ -37,8 +37,8 @@ _OTHERS = {
 _REFUSED = re.compile("user|host|mail|date|time")
 # Values that must be equal may differ by this relative difference, due to rounding.
 _ROUNDING = 1e-9
-# Units that targets may have: m for lengths, 1 for other quantities and for targets of several kinds.
-_UNITS_OF_TARGETS = dict.fromkeys(("step_target", "snapshot_target"), ("1", "m"))
+# Units that targets may have: those of pressures, forces and lengths; 1 for other quantities and for several kinds.
+_UNITS_OF_TARGETS = dict.fromkeys(("step_target", "snapshot_target"), ("1", "m", "Pa", "N"))
 
 
 class UnknownFile(ValueError):

@@ -30,21 +30,23 @@ def plot_separation(run: xr.Dataset, axes: Axes | None = None, **look: object) -
     return _plot_against_pressure(run, "mean_gap", "mean gap", axes, look)
 
 
-def plot_contact(run: xr.Dataset, snapshot: int = -1, axes: Axes | None = None) -> Axes:
+def plot_contact(run: xr.Dataset, axes: Axes | None = None, *, snapshot: int = -1) -> Axes:
     """Draw the contact spots, or with boundary elements the contact map, of a snapshot; return the axes.
 
     Parameters
     ----------
     run : dataset from `icha.simulate`, or the file of a run.
-    snapshot : number of the snapshot; the last one by default.
     axes : axes to draw on; None for new axes.
+    snapshot : number of the snapshot; the last one by default.
     """
     axes = _new_axes() if axes is None else axes
     side = float(run["period"])
     factor, unit = choose_unit(side, "m")
     if "contact_map" in run:
         contact = run["contact_map"].isel(snapshot=snapshot).transpose("row", "column").values
-        axes.imshow(contact, origin="lower", extent=(0, side * factor, 0, side * factor), cmap="Greys", vmin=0, vmax=1)
+        # Nodes are the centres of the cells.
+        ends = np.array([-0.5, len(contact) - 0.5]) * side * factor / len(contact)
+        axes.imshow(contact, origin="lower", extent=(*ends, *ends), cmap="Greys", vmin=0, vmax=1)
     else:
         from matplotlib.collections import EllipseCollection
 

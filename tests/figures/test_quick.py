@@ -3,6 +3,7 @@
 import logging
 
 import matplotlib as mpl
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import small_campaign as small
@@ -29,8 +30,11 @@ def test_area_and_separation_are_drawn_in_units_with_prefixes():
 def test_contact_is_drawn_for_both_models(model):
     surface = icha.SelfAffineSpectrum(100e-6, 40e-6, 25e-6, 0.8).realise(32, 1)
     run = icha.simulate(surface, small.MATERIALS["hertz"], icha.Path([1e-2]), model=model)
-    axes = icha.plot_contact(run)
-    assert axes.get_xlabel() == "$x$ (µm)" and axes.get_xlim()[1] == pytest.approx(100)
+    _, given = plt.subplots()
+    axes = icha.plot_contact(run, given)
+    assert axes is given and axes.get_xlabel() == "$x$ (µm)"
+    # The cells of a map lie around the nodes, from x = 0.
+    assert axes.get_xlim()[1] == pytest.approx(100 if model == "asperities" else 100 - 50 / 32)
     shown = axes.collections[0].get_offsets() if model == "asperities" else axes.images[0].get_array()
     assert len(shown) == (run.sizes["spot"] if model == "asperities" else 32)
 

@@ -38,6 +38,10 @@ def labels(model, material="soft", seed=1):
     return RunLabels("one", model, "rough", seed, 1.0, material)
 
 
+# Variables on the cells of the grid.
+MAPS = {"contact_map", "contact_pressure", "gap_map", "displacement_map", "x", "y"}
+
+
 @pytest.fixture(scope="module")
 def runs():
     """Both models of one material, and asperities alone of the other; tests must not change them."""
@@ -72,6 +76,29 @@ def test_a_run_says_by_which_model_it_is(runs, tmp_path):
     )
 
 
+def test_maps_of_gap_and_displacement_are_those_of_the_state(runs):
+    patched, surface = runs[labels(REFERENCE_MODEL)], small.surface(1)
+    np.testing.assert_allclose(patched["x"], np.arange(32) * surface.spacing)
+    assert patched["x"].dims == ("column",) and patched["y"].dims == ("row",)
+    assert {"x", "y"} <= set(patched["gap_map"].coords)
+    for k, step in enumerate(patched["snapshot_step"].values):
+        gap, displacement = (patched[f"{name}_map"].values[k] for name in ("gap", "displacement"))
+        closed = patched["contact_map"].values[k] >= 1
+        assert closed.any() and np.abs(gap[closed]).max() < 1e-7 * surface.rms_height
+        assert gap.mean() == pytest.approx(float(patched["mean_gap"][step]), rel=1e-5)
+        assert abs(displacement.mean()) < 1e-6 * surface.rms_height
+        expected = displacement + float(patched["mean_separation"][step]) - surface.heights
+        np.testing.assert_allclose(gap, expected, atol=1e-6 * surface.rms_height)
+
+
+def test_a_gap_may_be_infinite_where_a_shape_has_no_surface(tmp_path):
+    punch = icha.Surface(np.zeros((32, 32)), 1e-3, "free", icha.FlatPunch(2e-4))
+    run = icha.simulate(punch, icha.Material(1e6, 0.0), icha.Path(forces=[1e-3]), model=REFERENCE_MODEL)
+    assert np.isinf(run["gap_map"].values).any() and np.isfinite(run["displacement_map"].values).all()
+    write_dataset(run, tmp_path / "run.nc")
+    assert problems_with_file(RUN, identify_file(tmp_path / "run.nc")[1]) == []
+
+
 def test_model_is_the_first_dimension_of_every_study(runs, tmp_path):
     assert LABELS[0] == "model"
     tree = small.tree()
@@ -85,7 +112,7 @@ def test_model_is_the_first_dimension_of_every_study(runs, tmp_path):
     assert study["model"].values.tolist() == [DEFAULT_MODEL, REFERENCE_MODEL]
     assert study["status"].values.ravel().tolist() == [0, 0, 0, 3]
     # Maps stay in the files of the runs; what asperities do not have is missing.
-    assert not {"contact_map", "contact_pressure", "row", "column"} & {*study.variables, *study.dims}
+    assert not {*MAPS, "row", "column"} & {*study.variables, *study.dims}
     front = study["front_residual"]
     assert (
         np.isnan(front.sel(model=DEFAULT_MODEL)).all() and front.attrs["missing"] == "in runs with the model asperities"
@@ -103,7 +130,7 @@ def test_every_run_of_both_models_is_taken_out_unchanged(runs):
     for each, original in runs.items():
         taken = select_run(tree, each)
         assert taken.attrs["contact_model"] == each.model
-        kept = set(original.variables) - {"contact_map", "contact_pressure"}
+        kept = set(original.variables) - MAPS
         assert set(taken.variables) - {"model", "surface", "material"} == kept
         for name in kept:
             np.testing.assert_array_equal(taken[name].values, original[name].values, err_msg=f"{each} {name}")

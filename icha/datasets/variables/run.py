@@ -32,6 +32,7 @@ _ATTRIBUTES = {
     "contact_stiffness": {INFINITE: "in full contact"},
     "stiffness": {INFINITE: "in full contact"},
     "slope_anisotropy": {INFINITE: "for straight grooves"},
+    "gap_map": {INFINITE: "where a shape has no surface"},
     "event_kind": {
         "flag_values": np.arange(len(EVENT_KINDS), dtype=np.int8),
         "flag_meanings": " ".join(EVENT_KINDS),
@@ -43,9 +44,15 @@ _ATTRIBUTES = {
 # Variables of every run, of runs whose path continues after the first loading, of runs that end in separation, and of
 # runs on a free square. Not every run on a free square has all variables of INDENTER.
 RUN, CYCLE, LOOP, INDENTER = read_tables("run.txt", TERMS, _ATTRIBUTES, meaning=MEANING).values()
+# Coordinates of the cells in maps.
+_PLACES = {axis: TERMS[axis]._replace(dims=(dim,), coordinate=True) for axis, dim in zip("yx", CELLS, strict=True)}
 # Variables that only runs with a certain model have, by name of the model.
 FURTHER = {
-    name: {key: Variable(*facts, np.dtype(dtype).type) for key, (*facts, dtype) in model.variables.items()}
+    name: (_PLACES if model.by_cells else {})
+    | {
+        key: Variable(*facts, np.dtype(dtype).type, _ATTRIBUTES.get(key, {}))
+        for key, (*facts, dtype) in model.variables.items()
+    }
     for name, model in MODELS.items()
 }
 OF_MODELS = {key: description for table in FURTHER.values() for key, description in table.items()}

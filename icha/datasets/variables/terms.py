@@ -104,4 +104,10 @@ def bin_table(quantity: str, units: str, over: str = "") -> Table:
     }
 
 
+def is_refused(values: np.ndarray, attrs: Mapping[str, object]) -> np.ndarray:
+    """Return True for values of a variable that are not finite, except infinite values that `attrs` allow."""
+    refused = ~np.isfinite(values)
+    return refused & ~np.isposinf(values) if INFINITE in attrs else refused
+
+
 TERMS = read_tables("terms.txt")[""]
