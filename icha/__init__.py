@@ -14,6 +14,7 @@ _HOME = {
     "simulate": "simulation",
     **dict.fromkeys(("plot_area", "plot_contact", "plot_separation"), "figures.quick"),
     "ConvergenceError": "simulation",
+    "IchaWarning": "support.usual",
 }
 __all__ = ["__version__", *_HOME]
 
@@ -26,6 +27,7 @@ if TYPE_CHECKING:  # for editors and type checkers only
     from icha.path.targets import Path as Path
     from icha.simulation import ConvergenceError as ConvergenceError
     from icha.simulation import simulate as simulate
+    from icha.support.usual import IchaWarning as IchaWarning
     from icha.surfaces.shapes import Cone as Cone
     from icha.surfaces.shapes import CylinderPunch as CylinderPunch
     from icha.surfaces.shapes import FlatPunch as FlatPunch

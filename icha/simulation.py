@@ -5,7 +5,7 @@ import logging
 import math
 import pathlib
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -55,6 +55,7 @@ from icha.path.targets import (
 )
 from icha.references.indenter_runs import loop_values, sphere_radius, step_values
 from icha.support.rules import IntegerRange
+from icha.support.usual import IchaWarning, unusual_arguments
 from icha.surfaces.moments import height_statistics, slope_anisotropy, spectral_moments
 from icha.surfaces.shapes import describe_shape
 from icha.surfaces.summits import SummitCoverage, locate_summits
@@ -126,8 +127,9 @@ def simulate(
 
     Warns
     -----
-    UserWarning
-        If the run fails checks. The numbers of this run must not be used.
+    IchaWarning
+        If an argument is unusual, mostly because of a wrong unit. If the model is not applicable, or the run fails
+        checks: the numbers of this run must not be used.
 
     Raises
     ------
@@ -148,11 +150,25 @@ def simulate(
     seed = IntegerRange(-1).validate("seed", seed)
     if progress is None and _LOGGER.isEnabledFor(logging.INFO):
         progress = _LOGGER.info
+    for text in _unusual_arguments(surface, material):
+        warnings.warn(text, IchaWarning, stacklevel=2)
     dataset = _compute(solver, surface, material, path, model, seed, progress, kept)
+    if dataset.attrs["applicability"]:
+        warnings.warn(dataset.attrs["applicability"], IchaWarning, stacklevel=2)
     if failed := reasons_of_failure(check_run(dataset)):
         dataset = dataset.assign_attrs(failed_checks=failed)
-        warnings.warn(f"The run fails checks; do not use the numbers of this run: {failed}", stacklevel=2)
+        warnings.warn(f"The run fails checks; do not use the numbers of this run: {failed}", IchaWarning, stacklevel=2)
     return dataset
+
+
+def _unusual_arguments(surface: Surface, material: Material) -> Iterator[str]:
+    """Yield a message for each property of a surface or a material that is outside its usual range."""
+    slope = {} if surface.smooth else {"rms_slope": surface.rms_slope}
+    shape = vars(surface.shape) if surface.shape else {}
+    # Without adhesion, the range of attraction has no effect.
+    unused = () if material.surface_energy else ("interaction_range",)
+    given = vars(material) | shape | {"period": surface.period} | slope
+    return unusual_arguments({name: value for name, value in given.items() if name not in unused})
 
 
 def _compute(solver, surface, material, path, model, seed, progress, kept):

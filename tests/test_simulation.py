@@ -4,13 +4,25 @@ import os
 import pickle
 import subprocess
 import sys
+import warnings
+from contextlib import suppress
 
 import numpy as np
 import pytest
 import xarray as xr
 from digests import digest
 
-from icha import ConvergenceError, Material, Paraboloid, Path, SelfAffineSpectrum, Sphere, Surface, simulate
+from icha import (
+    ConvergenceError,
+    IchaWarning,
+    Material,
+    Paraboloid,
+    Path,
+    SelfAffineSpectrum,
+    Sphere,
+    Surface,
+    simulate,
+)
 from icha.asperity.stickiness import stickiness
 from icha.datasets.format import RUN, problems_with_file
 from icha.surfaces.moments import spectral_moments
@@ -216,6 +228,36 @@ def test_bad_arguments_are_refused_by_name(argument, value):
     good = {"surface": rough(), "material": BARE, "path": Path(reduced_pressures=[1e-3]), "seed": 1}
     with pytest.raises(ValueError, match=argument):
         simulate(**(good | {argument: value}))
+
+
+def test_arguments_with_a_wrong_unit_give_a_warning():
+    fine = rough(slope=0.3)
+    with pytest.warns(IchaWarning, match=r"rms_slope: 3e\+08 is unusual; expected 1e-4 to 5 .* SI units") as raised:
+        Surface(fine.heights * 1e9, PERIOD)
+    with pytest.warns(IchaWarning, match="period: 100 m is unusual"):
+        Surface(fine.heights * 1e6, PERIOD * 1e6)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        Surface(fine.heights, PERIOD)
+        Surface(np.zeros((32, 32)), 1e-3, "free", Sphere(1e-2))
+    assert [each.filename for each in raised] == [__file__]
+    for material, name in (
+        (Material(25, 0.0), "contact_modulus: 25 Pa"),
+        (Material(25e6, 50.0, 2e-9), "surface_energy: 50 J/m"),
+        (Material(25e6, 0.05, 2.0), "interaction_range: 2 m"),
+    ):
+        # So much energy of adhesion leaves no equilibrium.
+        with pytest.warns(IchaWarning, match=f"{name}.* is unusual") as raised, suppress(ConvergenceError):
+            simulate(fine, material, Path([1e-3]))
+        assert raised[0].filename == __file__
+    lens = Surface(np.zeros((32, 32)), 1e-3, "free", Sphere(50.0))
+    with pytest.warns(IchaWarning, match="radius: 50 m is unusual"):
+        simulate(lens, BARE, Path(contact_radii=[2e-4]), model="boundary_elements")
+
+
+def test_a_model_that_is_not_applicable_gives_a_warning():
+    with pytest.warns(IchaWarning, match="asperity model not applicable: full contact has a lower energy"):
+        simulate(rough(slope=0.1), Material(1e6, 0.5), Path(mean_separations=[8 * rough(slope=0.1).rms_height]))
 
 
 def test_a_smooth_sphere_pulls_off_as_jkr_says_also_if_an_area_lies_inside_its_jump():

@@ -14,65 +14,13 @@ from icha.configuration.surfaces import SelfAffineSurface
 from icha.contact.models import DEFAULT_MODEL
 from icha.datasets.labels import is_derived_study
 from icha.support import formatting
+from icha.support.usual import RMS_SLOPE, SIDE, USUAL, Usual
 from icha.support.values import Problem, to_number, to_si
 from icha.surfaces.moments import self_affine_full_contact_energy
 
 CONFIRMED = "confirmed"
 # Sections whose keys are checked.
 _SECTIONS = ("defaults", "surfaces", "materials", "studies")
-
-
-class Usual(NamedTuple):
-    """Usual range of the values of a key, and the reason for this range."""
-
-    si_unit: str
-    least: str
-    most: str
-    why: str
-    or_zero: bool = False
-
-    def contains(self, value: Any) -> bool:
-        """Return whether a value is in the usual range; True for invalid values, which other checks report."""
-        try:
-            number = self._read(value)
-        except ValueError:
-            return True
-        # Other checks report negative values, and zero where it is not valid.
-        return number <= 0 or self._read(self.least) <= number <= self._read(self.most)
-
-    def _read(self, value):
-        return to_number(value) if self.si_unit == "1" else to_si(value, self.si_unit)
-
-    def __str__(self):
-        """Return the usual range and its reason, as text for messages."""
-        return f"{'0 or ' if self.or_zero else ''}{self.least} to {self.most} ({self.why})"
-
-
-_MODULUS = Usual("Pa", "1 kPa", "2000 GPa", "from soft gels to diamond on a rigid body, 1150 GPa")
-_SIDE = Usual("m", "1 nm", "1 m", "from a few atoms to a machine part")
-_WAVE = Usual("m", "0.1 nm", "1 m", "from an atom to a machine part")
-_RADIUS = Usual("m", "1 nm", "10 m", "from the tip of a microscope to a nearly flat lens")
-_SLOPE = Usual("1", "1e-4", "5", "superpolished mirrors have 1e-3, fracture surfaces about 1")
-_OF_ENERGY = "van der Waals forces give 10 to 200 mJ/m^2, clean metals 1 to 3 J/m^2"
-_OF_RANGE = "chemical bonds have less than 1 nm, van der Waals forces some nm; a coarse grid may need some 100 nm"
-# Usual values by key. The ranges contain every reasonable value and exclude most values with a wrong unit prefix.
-USUAL = {
-    "contact_modulus": _MODULUS,
-    "youngs_modulus": _MODULUS,
-    "surface_energy": Usual("J/m^2", "0.001 mJ/m^2", "3 J/m^2", _OF_ENERGY, or_zero=True),
-    "interaction_range": Usual("m", "0.05 nm", "1 um", _OF_RANGE),
-    "period": _SIDE,
-    "side": _SIDE,
-    "thickness": _SIDE,
-    "radius": _RADIUS,
-    "radii": _RADIUS,
-    "size": _SIDE,
-    "rolloff_wavelength": _WAVE,
-    "short_wavelength": _WAVE,
-    "cutoff": _WAVE,
-    "rms_slope": _SLOPE,
-    "rms_slopes": _SLOPE,
-}
 
 
 class Unusual(NamedTuple):
@@ -107,8 +55,16 @@ def _unusual(location: tuple, value: Any) -> Iterator[Unusual]:
             yield from _unusual((*location, key), each)
         return
     name = next(key for key in reversed(location) if isinstance(key, str))
-    if name in USUAL and not USUAL[name].contains(value):
+    if name in USUAL and not USUAL[name].contains(_number(value, USUAL[name].unit)):
         yield Unusual(location, value, USUAL[name])
+
+
+def _number(value, unit):
+    """Return a value of the configuration in its SI unit; 0 for invalid values, which other checks report."""
+    try:
+        return to_number(value) if unit == "1" else to_si(value, unit)
+    except ValueError:
+        return 0.0
 
 
 def unusual_topography(location: tuple, section: Any, period: float, rms_slope: float | None) -> Iterator[Unusual]:
@@ -120,11 +76,11 @@ def unusual_topography(location: tuple, section: Any, period: float, rms_slope: 
     period : side of the square, m.
     rms_slope : measured rms slope; None if no study uses the measured slope.
     """
-    if getattr(section, "size", section) is None and not _SIDE.contains(f"{period!r} m"):
-        yield Unusual((*location, "size"), formatting.length(period), _SIDE, " in the file")
-    if rms_slope is not None and not _SLOPE.contains(rms_slope):
+    if getattr(section, "size", section) is None and not SIDE.contains(period):
+        yield Unusual((*location, "size"), formatting.length(period), SIDE, " in the file")
+    if rms_slope is not None and not RMS_SLOPE.contains(rms_slope):
         source = " (the slope depends on units, size and numbers for missing points)"
-        yield Unusual((*location, "height_unit"), f"rms slope {rms_slope:.3g}", _SLOPE, source)
+        yield Unusual((*location, "height_unit"), f"rms slope {rms_slope:.3g}", RMS_SLOPE, source)
 
 
 def plausibility_problems(
@@ -143,19 +99,18 @@ def unusual_heights(campaign: Campaign) -> Iterator[Unusual]:
         if study.rms_heights is None or is_derived_study(name, campaign.studies):
             continue
         for contact in campaign.contacts(name):
-            if not campaign.surfaces[contact.surface].smooth and not _SLOPE.contains(contact.rms_slope):
+            if not campaign.surfaces[contact.surface].smooth and not RMS_SLOPE.contains(contact.rms_slope):
                 heights = ", ".join(map(formatting.length, study.rms_heights))
                 source = f" on {contact.surface}, where the rms slope is {contact.rms_slope:.3g}"
-                yield Unusual(("studies", name, "rms_heights"), heights, _SLOPE, source)
+                yield Unusual(("studies", name, "rms_heights"), heights, RMS_SLOPE, source)
                 break
 
 
-_TOO_STICKY = (
-    "for smaller values full contact has a lower energy than separated surfaces, and the asperity model does not "
-)
+_TOO_STICKY = f"{FULL_CONTACT_BELOW:g} to inf (for smaller values full contact has a lower energy than separated "
+_TOO_STICKY += "surfaces, and the asperity model does not "
 _TOO_STICKY += "apply; use a rougher surface, a stiffer material, or "
-_RATIO = Usual("1", f"{FULL_CONTACT_BELOW:g}", "inf", f"{_TOO_STICKY}`models: [boundary_elements]`")
-_RATIO_OF_LEVELS = _RATIO._replace(why=f"{_TOO_STICKY}`levels` without `asperities`")
+_RATIO = Usual(FULL_CONTACT_BELOW, math.inf, f"{_TOO_STICKY}`models: [boundary_elements]`)")
+_RATIO_OF_LEVELS = _RATIO._replace(text=f"{_TOO_STICKY}`levels` without `asperities`)")
 
 
 def energy_ratio(campaign: Campaign, contact) -> float:

@@ -128,8 +128,9 @@ def read_scan(path: str | os.PathLike, *, confirmed: Collection[str] = (), **key
         slope is not confirmed. A ConfigurationError is also a ValueError.
     """
     from icha.configuration.plausibility import plausibility_problems, unusual_topography, unusual_values
+    from icha.support.usual import IchaWarning
     from icha.surfaces.measured.settings import UnfitTopography
-    from icha.surfaces.surface import MISFIT_OF_EDGES, EdgeWarning, edges_fit
+    from icha.surfaces.surface import MISFIT_OF_EDGES, edges_fit
 
     def unconfirmed(unusual):
         unusual = [each._replace(location=each.location[2:]) for each in unusual]
@@ -148,5 +149,5 @@ def read_scan(path: str | os.PathLike, *, confirmed: Collection[str] = (), **key
     unusual = unusual_topography(("surfaces", "scan"), measured, surface.period, surface.rms_slope)
     refuse("read_scan", unconfirmed(unusual))
     if not surface.free and not edges_fit(surface.heights):
-        warnings.warn(MISFIT_OF_EDGES, EdgeWarning, stacklevel=2)
+        warnings.warn(MISFIT_OF_EDGES, IchaWarning, stacklevel=2)
     return surface

@@ -20,6 +20,7 @@ import scipy.fft
 from icha.support.formatting import choose_unit, format_quantity, html_table
 from icha.support.parallel import blocks, on_cores
 from icha.support.rules import LENGTH, SLOPE, FloatRange, IntegerRange
+from icha.support.usual import IchaWarning, unusual_arguments
 from icha.surfaces.square import problem_with_heights
 
 if TYPE_CHECKING:
@@ -53,10 +54,6 @@ _OFF_THE_NODES = 0.29
 _LEAST_UNIT = 1e-3
 
 
-class EdgeWarning(UserWarning):
-    """Warning: the heights at opposite edges of a periodic surface differ by a step."""
-
-
 @dataclass(frozen=True, eq=False)
 class Surface:
     """A rough surface of zero mean height: one cell of a periodic surface, or a single square, which may have a shape.
@@ -70,6 +67,12 @@ class Surface:
     boundary : "periodic" (in both directions), or "free" (a single square; the half-space is larger than the square).
     shape : smooth shape that carries the roughness, such as `icha.Sphere`, with its apex in the middle of the square;
         only with the boundary "free". The roughness may then be zero.
+
+    Warns
+    -----
+    IchaWarning
+        If the period or the rms slope is unusual, mostly because of a wrong unit, or if heights of a periodic surface
+        have a step at the edges.
 
     Raises
     ------
@@ -110,10 +113,13 @@ class Surface:
             raise ValueError(f"boundary: {self.boundary!r}; a surface with a shape needs {FREE!r}")
         if self.shape and (not np.isfinite(self.profile).any() or np.isnan(self.profile).any()):
             raise ValueError(f"shape: {self.shape} does not fit a square of side {self.period:g} m")
-        # Only surfaces that users make cause the warning. `icha describe` reports the step for other surfaces.
-        caller = sys._getframe(2).f_globals.get("__name__", "")
-        if not self.free and not caller.startswith(("icha.", "dataclasses")) and not edges_fit(heights):
-            warnings.warn(MISFIT_OF_EDGES, EdgeWarning, stacklevel=3)
+        # Only surfaces that users make cause warnings. Campaigns report the same problems of other surfaces.
+        if sys._getframe(2).f_globals.get("__name__", "").startswith(("icha.", "dataclasses")):
+            return
+        if not self.free and not edges_fit(heights):
+            warnings.warn(MISFIT_OF_EDGES, IchaWarning, stacklevel=3)
+        for text in unusual_arguments({"period": self.period} | ({} if self.smooth else {"rms_slope": self.rms_slope})):
+            warnings.warn(text, IchaWarning, stacklevel=3)
 
     def detrended(self, degree: int = 1) -> Surface:
         """Return a free square without its tilt (`degree` 1), or also without its curvature (`degree` 2)."""

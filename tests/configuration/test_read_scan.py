@@ -10,7 +10,6 @@ import pytest
 import icha
 from icha.configuration.surfaces import MeasuredSurface
 from icha.surfaces.measured.topography import prepared_topography
-from icha.surfaces.surface import EdgeWarning
 
 PERIOD = 1e-5
 KEYS = {"size": "10 um", "height_unit": "nm"}
@@ -81,21 +80,21 @@ def test_periodic_surfaces_give_no_warning(grid, cells, roll_off, hurst):
 @pytest.mark.filterwarnings("error")
 def test_white_noise_and_domes_give_no_warning():
     for seed in range(50):
-        icha.Surface(np.random.default_rng(seed).normal(size=(8, 8)), 1.0)
+        icha.Surface(0.1 * np.random.default_rng(seed).normal(size=(8, 8)), 1.0)
     x = np.arange(64)
     dome = -((x[:, None] - 32) ** 2 + (x - 32.0) ** 2) / 1000
-    icha.Surface(np.roll(dome, (13, 40), (0, 1)), 64.0)
+    icha.Surface(np.roll(dome, (13, 40), (0, 1)) / 64, 1.0)
 
 
 @pytest.mark.parametrize("cells", [4, 8])
 def test_tilted_and_cropped_scans_give_a_warning(cells):
     tilt = 0.05 * PERIOD * np.arange(64) / 64
-    with pytest.warns(EdgeWarning, match=r"boundary: 'periodic'.*icha\.read_scan") as raised:
+    with pytest.warns(icha.IchaWarning, match=r"boundary: 'periodic'.*icha\.read_scan") as raised:
         icha.Surface(rough(cells=cells) + tilt, PERIOD)
     assert raised[0].filename == __file__
     for seed in range(4):
         part = rough(256, cells=cells, seed=seed)[:128, :128]
-        with pytest.warns(EdgeWarning):
+        with pytest.warns(icha.IchaWarning, match="step at the edges"):
             icha.Surface(part, PERIOD)
         with warnings.catch_warnings():
             warnings.simplefilter("error")
@@ -103,5 +102,5 @@ def test_tilted_and_cropped_scans_give_a_warning(cells):
 
 
 def test_a_scan_that_is_not_periodic_gives_a_warning(file):
-    with pytest.warns(EdgeWarning):
+    with pytest.warns(icha.IchaWarning, match="step at the edges"):
         icha.read_scan(file, **KEYS, boundary="periodic")
