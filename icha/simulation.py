@@ -50,6 +50,7 @@ from icha.path.targets import (
     NOMINAL_PRESSURE,
     RELATIVE_LOAD,
     UNITS,
+    WITHOUT_ADHESION,
     Path,
     Target,
 )
@@ -312,6 +313,8 @@ def _check_arguments(surface, material, path, by_summits):
         if target in limited and target.kind in ASPERITY_RANGES and target.value > 0:
             ASPERITY_RANGES[target.kind].validate(f"path: {target.kind}", target.value)
         _check_target(surface, material, target, by_summits)
+        if target.needs_adhesion and not material.surface_energy and (target.value < 0 or target in path.targets):
+            raise ValueError(f"path: {target.describe()} {WITHOUT_ADHESION}")
 
 
 def _check_target(surface, material, target, by_summits):

@@ -11,7 +11,7 @@ from icha.checks.loops import LOOP_CHECKS, check_events, check_loop, finite_stif
 from icha.contact.models import AREA_TOLERANCE_CELLS, AREA_TOLERANCE_PART, SMALLEST_LOAD, model_of
 from icha.datasets.variables.run import INDENTER, OF_MODELS, RUN
 from icha.datasets.variables.terms import INFINITE
-from icha.path.targets import AREAS, BETWEEN, CONTACT_RADIUS
+from icha.path.targets import AREAS, BETWEEN, CONTACT_RADIUS, LOADS
 
 # Largest error of an equilibrium, in h_rms, and largest relative error of a target. Boundary elements meet loads and
 # areas to 1e-6 (`PathAccuracy.target`).
@@ -101,6 +101,7 @@ def _check_loading(run) -> Iterator[tuple]:
         "nominal_pressure",
         "mean_separation",
         "step_kind",
+        "step_target",
         "coalescence_count",
         "jump_in_count",
     )
@@ -150,14 +151,16 @@ def _largest_fall_in_loading(loading, name, *, jumps=False):
 def _largest_rises_of_separation(loading):
     """Return the largest rise of the mean separation, m, in steps without unions, and in steps with unions.
 
-    Steps in which the area increases to an area target are ignored, because the separation may rise in such a step. If
-    the area jumps past a target, the path meets the target on the branch after the jump; see also `_retreats`.
+    Steps in which the area increases to a target that is an area, zero load or tension are ignored, because the
+    separation may rise in such a step. If the contact jumps past a target, the path meets the target on the branch
+    after the jump; see also `_retreats`.
     """
     rise = np.diff(loading["mean_separation"])
-    given_area = np.isin(loading["step_kind"][1:], AREAS) & (np.diff(loading["contact_area_fraction"]) > 0)
-    given_area |= _retreats(loading)[1:]
+    ignored = np.isin(loading["step_kind"], AREAS)
+    ignored |= np.isin(loading["step_kind"], LOADS) & (loading["step_target"] <= 0)
+    ignored = ignored[1:] & (np.diff(loading["contact_area_fraction"]) > 0) | _retreats(loading)[1:]
     united = np.diff(loading["coalescence_count"]) != 0
-    return tuple(float(np.max(rise[where & ~given_area], initial=0.0)) for where in (~united, united))
+    return tuple(float(np.max(rise[where & ~ignored], initial=0.0)) for where in (~united, united))
 
 
 def _retreats(loading):

@@ -28,7 +28,7 @@ from icha.configuration.studies import (
 from icha.configuration.surfaces import AnySurface, MaterialSection
 from icha.contact.models import MODELS
 from icha.datasets.labels import is_derived_study
-from icha.path.targets import FORCE, INDENTATION, QUANTITIES
+from icha.path.targets import FORCE, INDENTATION, QUANTITIES, WITHOUT_ADHESION, Target
 from icha.support import formatting
 from icha.support.input_files import read_columns
 from icha.support.values import ROUNDING, Name, Problem, Section, Text, distinct
@@ -250,6 +250,7 @@ class Campaign(Section):
             if is_derived_study(label, self.studies):
                 continue  # its problems are those of the study from which it is derived
             yield from _within(("studies", label), study.problems(self.snapshots_of(label), *self._units(label)))
+            yield from _within(("studies", label), self._tension_problems(study))
             yield from _within(("studies", label), self._edge_problems(study))
         sections = {section: getattr(self, section) for section in (*BESIDE_STUDIES, "measurements")}
         for section, entries in (sections | {"figures": self.figures.by_name()}).items():
@@ -306,6 +307,13 @@ class Campaign(Section):
                     f"{surface.cells_per_short_wave:.3g}; expected asperities, or a `grid` of {enough} or more for "
                     f"{name!r} (better {better})",
                 )
+
+    def _tension_problems(self, study: Study) -> Iterator[Problem]:
+        """Yield a problem for each load that a material without adhesion cannot have."""
+        without = [name for name in study.materials if not self.materials[name].surface_energy]
+        for location, kind, value in study.states() if without else ():
+            if Target(kind, value).needs_adhesion and (value < 0 or location[0] != "turning_points"):
+                yield location, value, f"{WITHOUT_ADHESION} of {without[0]!r}"
 
     def _edge_problems(self, study: Study) -> Iterator[Problem]:
         """Yield a problem for each sphere whose contact is larger than its square, by the theory of JKR or Hertz."""

@@ -30,16 +30,18 @@ from icha.path.targets import (
     ESTIMATED_OF_LOOPS,
     FORCE,
     LARGEST_REDUCED_PRESSURE,
+    LEAST_PRESSURE,
     MAX_AREA_FRACTION,
     MAX_REDUCED_PRESSURE,
     NOMINAL_PRESSURE,
     QUANTITIES,
+    REDUCED_PRESSURE,
     RELATIVE_LOAD,
     STEP,
     Path,
 )
 from icha.support.formatting import format_quantity, length
-from icha.support.rules import FORCES, NUMBER, PRESSURES, REFINEMENT, SLOPE, TOLERANCE, FloatRange
+from icha.support.rules import REFINEMENT, SLOPE, TOLERANCE, FloatRange
 from icha.support.values import (
     Force,
     Label,
@@ -136,7 +138,10 @@ Values = Annotated[
 
 
 class Targets(Section):
-    """The targets of the loading path. Exactly one of the lists must be given."""
+    """The targets of the loading path. Exactly one of the lists must be given.
+
+    With adhesion, loads may be zero or tensile (negative); loading meets them in contact, where the load rises to them.
+    """
 
     reduced_pressures: stops(ReducedPressure, increasing) | None = Field(
         default=None,
@@ -184,21 +189,8 @@ def _list_or_word(value: Any, read_list: Callable[[Any], Any]) -> Any:
     return value if value == EVERY_STOP else read_list(value)
 
 
-_ANY_PRESSURE = FloatRange("Pa", least=-PRESSURES.most, most=PRESSURES.most)
-_ANY_FORCE = FloatRange("N", least=-FORCES.most, most=FORCES.most)
-
-
 class TurningPoint(Snapshot):
     """A state at which the loading direction changes. Exactly one key must be given. Tensile loads are negative."""
-
-    reduced_pressure: number(FloatRange(most=LARGEST_REDUCED_PRESSURE)) | None = None
-    """Reduced pressure p/(E* h'rms) of the turning point."""
-    relative_load: number(NUMBER) | None = None
-    """Relative load p/E* = F/(E* A0) of the turning point."""
-    pressure: quantity(_ANY_PRESSURE, "-10 kPa") | None = None
-    """Nominal pressure F/A0 of the turning point, with its unit."""
-    force: quantity(_ANY_FORCE, "-1 mN") | None = None
-    """Normal force of the turning point, with its unit."""
 
 
 # Names and descriptions of the parameters that a study may vary: all keys except these.
@@ -397,7 +389,9 @@ class Study(Section):
         slope = min((slope for slope in self.rms_slopes if not is_unread(slope) and slope > 0), default=math.inf)
         units = {RELATIVE_LOAD: (slope, ""), NOMINAL_PRESSURE: (pressure_unit, "Pa"), FORCE: (force_unit, "N")}
         largest_radius = side * math.sqrt((MAX_AREA_FRACTION if by_summits else 1.0) / math.pi)
-        for location, kind, value in self._states():
+        for location, kind, value in self.states():
+            if kind == REDUCED_PRESSURE and 0 < abs(value) < LEAST_PRESSURE:
+                yield location, value, f"is too close to zero; expected 0, or an absolute value from {LEAST_PRESSURE:g}"
             # If a study has both models, asperity runs may end early at the limit of the asperity model. Therefore only
             # the first target and the turning points must be within this limit.
             needed = alone or (DEFAULT_MODEL in self.models and (location[-1] == 0 or location[0] == "turning_points"))
@@ -419,7 +413,7 @@ class Study(Section):
         if self.unload or self.turning_points or self.control != "separation":
             yield from self._path_problems(snapshots)
 
-    def _states(self) -> Iterator[tuple[tuple, str, float]]:
+    def states(self) -> Iterator[tuple[tuple, str, float]]:
         """Yield location (keys), kind and value of each target, snapshot and turning point."""
         for k, (kind, value) in enumerate(self.targets.states):
             yield ("targets", QUANTITIES[kind].plural, k), kind, value
@@ -506,7 +500,7 @@ class BesideStudy(Section):
 class BoundaryElements(BesideStudy):
     """Boundary elements that solve the contacts of a study at a finite range of attraction, for comparison."""
 
-    reduced_pressures: stops(ReducedPressure, increasing)
+    reduced_pressures: stops(number(FloatRange(least=LEAST_PRESSURE, most=LARGEST_REDUCED_PRESSURE)), increasing)
     """Reduced pressures p/(E* h'rms), increasing. The contact is solved at each pressure, and the runs of the study
     save a snapshot at each pressure."""
 

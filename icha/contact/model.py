@@ -10,6 +10,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from icha.contact.models import PathAccuracy
+    from icha.surfaces.shapes import Shape
     from icha.surfaces.summits import Asperities
     from icha.surfaces.surface import Surface
 
@@ -112,6 +113,7 @@ class ContactModel(Protocol):
     contact_modulus : E*, the unit of relative loads, Pa.
     pressure_unit : E* h'_rms, the unit of reduced pressures, Pa.
     rms_height : unit of separations, m: rms height of the surface, with a shape `Surface.unit_height`.
+    shape : shape that carries the roughness; None for a nominally flat surface.
     asperities : summits of the surface; there may be none if the model does not need them.
     area : nominal contact area A0, m^2.
     largest_area_fraction : the model is not valid if contact area divided by nominal area exceeds this value.
@@ -123,6 +125,7 @@ class ContactModel(Protocol):
     contact_modulus: float
     pressure_unit: float
     rms_height: float
+    shape: Shape | None
     asperities: Asperities
     area: float
     largest_area_fraction: float

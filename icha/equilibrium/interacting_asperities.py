@@ -16,6 +16,7 @@ from icha.equilibrium.equations import derivative_by_radius, pressure_or_area_fr
 from icha.equilibrium.sites import AsperityContact, ContactState, Sites
 from icha.equilibrium.solver import find_equilibrium
 from icha.half_space.free_square import mean_displacement
+from icha.surfaces.shapes import Shape
 from icha.surfaces.summits import LARGEST_DEPARTURE, SummitCoverage, find_summits, paraboloid_departure
 from icha.surfaces.surface import Surface
 
@@ -31,9 +32,11 @@ class InteractingAsperities(AsperityContact):
     Attributes
     ----------
     mean_height : mean height of the surface, m: 0 without a shape.
+    shape : shape that carries the roughness; None for a nominally flat surface.
     """
 
     mean_height: float = 0.0
+    shape: Shape | None = None
     # Largest contact area fraction of a state. A target is at most 0.25, but the search for a target may exceed 0.25.
     largest_area_fraction = 1.5 * 0.25
     area_step = 0.0
@@ -198,4 +201,4 @@ def contact_of(surface: Surface, material: Material) -> InteractingAsperities:
         )
     profile, units = surface.profile, (surface.unit_height, surface.unit_slope)
     mean_height = float(np.mean(profile[np.isfinite(profile)])) if surface.shape else 0.0
-    return InteractingAsperities(JKR(material), find_summits(surface), *units, mean_height)
+    return InteractingAsperities(JKR(material), find_summits(surface), *units, mean_height, surface.shape)

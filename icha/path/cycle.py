@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from icha.contact.model import ContactModel, NotConverged, State
+from icha.contact.model import BeyondModel, ContactModel, NotConverged, State
 from icha.path.energy_balance import Step, Waypoint, waypoint_between_targets
 from icha.path.loading import PathProgress
 from icha.path.step_accuracy import StepAccuracy
@@ -30,7 +30,8 @@ from icha.path.stops import (
     next_of_each_kind,
     sort_targets,
 )
-from icha.path.targets import LOADS, Path
+from icha.path.targets import LOADS, UNITS, Path
+from icha.support.formatting import format_quantity
 
 # Distance of the last station above first contact, in h_rms, without adhesion. Exactly at first contact, a spot may
 # remain in contact because of the error of the equilibrium.
@@ -50,7 +51,7 @@ def follow_cycle(
     longest : longest step of the separation, m.
     progress : record of the path's progress; it counts and reports the targets.
     """
-    start, targets = contact.untouched(), [TargetFunction(target, contact) for target in path.targets]
+    start, targets = contact.untouched(), [TargetFunction.on_loading(target, contact) for target in path.targets]
     # Targets at separations above first contact, where nothing touches.
     above = [t for t in targets if t.control is None and t.separation > start.separation]
     for each in sort_targets(above, -1):
@@ -68,7 +69,7 @@ def follow_cycle(
     if progress.skipped:
         raise cycle.make_path_error()
     for leg, turn in enumerate(path.turning_points, start=1):
-        target = TargetFunction(turn, contact)
+        target = TargetFunction(turn, contact) if leg % 2 else TargetFunction.on_loading(turn, contact)
         if (target.excess(cycle.state) > 0) != (leg % 2 == 1):
             cycle.leg, name = leg, "unloading" if leg % 2 else "loading"
             reason = f"leg {leg} ({name}) already starts beyond its turning point {turn.describe()}"
@@ -139,7 +140,8 @@ class _Cycle:
         """Follow one leg to all its targets or, with `until_apart`, to complete separation; yield all waypoints.
 
         A target inside a jump is kept in `progress.skipped` in leg 0, raises an error in later legs, and is left out
-        with `until_apart`. Raise `NotConverged` if the surfaces separate before the last target. At the end of loading,
+        with `until_apart`. So is a tension that loading has not reached when the load becomes positive. Raise
+        `BeyondModel` if the surfaces separate before the last target. At the end of loading,
         separations that are far apart (`_is_new_station`) become stations; on reloading, only those below all others.
         """
         self.leg, self.event_at, self.longest_part = leg, np.inf, 0.0
@@ -189,6 +191,12 @@ class _Cycle:
                 pending.remove(listed)
                 if leg == 0:
                     self.progress.record_target(listed.target, met)
+            if self.contact.pressure(met) >= 0:
+                for missed in [each for each in pending if each.rises and each.excess(met) > 0]:
+                    pending.remove(missed)
+                    self.progress.skipped.append(self._make_missed_error(missed))
+                    if leg:
+                        raise self.make_path_error()
             sent = yield between if target is None else Waypoint(target.target, met, leg, step)
         if self.loading:
             lowest = min(self.stations, default=np.inf)
@@ -331,7 +339,17 @@ class _Cycle:
     def _make_apart_error(self, target):
         """Return the exception for a path on which the surfaces separate before a turning point."""
         reason = f"the surfaces are apart before the turning point {target.target.describe()}"
-        if target.target.kind in LOADS:
-            tension = max(0.0, -self.accuracy.lowest_pressure / target.target.quantity.scale(self.contact))
-            reason += f"; the largest tension is {tension:.4g}"
-        return NotConverged(reason)
+        return BeyondModel(f"{reason}{self._describe_tension(target)}")
+
+    def _make_missed_error(self, target):
+        """Return the exception for a tension that loading does not reach."""
+        reason = f"loading does not reach the tension {target.target.describe()}{self._describe_tension(target)}"
+        return BeyondModel(f"{reason}. Larger tensions need unloading: `unload: true`, or `turning_points`")
+
+    def _describe_tension(self, target):
+        """Return the largest tension so far, in the unit of a target, as text; empty if the target is not a load."""
+        if target.target.kind not in LOADS:
+            return ""
+        tension = max(0.0, -self.accuracy.lowest_pressure / target.target.quantity.scale(self.contact))
+        unit = UNITS.get(target.target.kind)
+        return f"; the largest tension is {format_quantity(tension, unit) if unit else f'{tension:.4g}'}"

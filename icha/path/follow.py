@@ -28,15 +28,18 @@ def follow(contact: ContactModel, path: Path, report: Callable[[str], None] | No
     ------
     NotConverged
         If an equilibrium is not found even with short steps, if the path makes no progress, if the model is not valid
-        in a state of the path, if the surfaces separate before a turning point, or if a leg starts beyond its turning
-        point. Targets inside jumps also raise it: turning points at once, targets of the first loading after the other
-        targets have been met. On the last unloading, targets inside jumps are left out without an error.
+        in a state of the path, or if a leg starts beyond its turning point. It is a `BeyondModel` if physics ends the
+        path: if the surfaces separate before a turning point, or if targets lie inside jumps or are tensions that
+        loading does not reach. These targets raise it after the other targets of the first loading have been met;
+        turning points raise it at once. On the last unloading, targets inside jumps are left out without an error.
     """
     longest = path.max_step * contact.rms_height
     record = PathProgress(contact, len(path.targets), longest, report)
-    if not path.cyclic:
+    if not (path.cyclic or any(target.needs_adhesion for target in path.targets)):
         return first_loading(contact, [TargetFunction(target, contact) for target in path.targets], longest, record)
     waypoints = follow_cycle(contact, path, longest, record)
+    if not path.cyclic:
+        return (replace(each, step=None) for each in waypoints if each.target.kind != BETWEEN)
     if path.control == LOAD_CONTROL:
         return select_load_control(contact, waypoints)
     return _add_balances(contact, waypoints)

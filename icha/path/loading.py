@@ -15,6 +15,7 @@ from icha.path.stops import (
     SAME_SEPARATION,
     InsideJump,
     TargetFunction,
+    describe_separation,
     find_first_target,
     next_of_each_kind,
     sort_targets,
@@ -41,7 +42,7 @@ class PathProgress:
     longest : longest step of the separation, m.
     report : function that is called with each line of a report; None for no reports.
     reached : number of targets of the first loading met so far.
-    skipped : errors of the targets that lie inside jumps.
+    skipped : errors of the targets that the path cannot meet, such as targets inside jumps.
     progress_from : separation, m; progress means a change from it, up or down, of at least the longest step.
     idle : number of equilibria since the last progress: since the last target, or since `progress_from` was set.
     reported : time of the last report, s.
@@ -52,7 +53,7 @@ class PathProgress:
     longest: float
     report: Callable[[str], None] | None = None
     reached: int = 0
-    skipped: list[InsideJump] = field(default_factory=list)
+    skipped: list[NotConverged] = field(default_factory=list)
     progress_from: float = np.inf
     idle: int = 0
     reported: float = field(default_factory=time.monotonic)
@@ -81,13 +82,12 @@ class PathProgress:
         self.report_position(f"stop {self.reached} of {self.total}: {target.describe()}", state)
 
     def report_position(self, name: str, state: State) -> None:
-        """Report the separation (in h_rms), the area fraction A/A0 and the number of spots of a state."""
+        """Report the separation, the area fraction A/A0, the pressure and the number of spots of a state."""
         if self.report is not None:
             contact, self.reported = self.contact, time.monotonic()
             self.report(
-                f"{name}, separation {state.separation / contact.rms_height:.4f} h_rms, "
-                f"A/A0 {contact.area_fraction(state):.4e}, p {contact.pressure(state):.4g} Pa, "
-                f"{contact.spot_count(state)} spots"
+                f"{name}, at {describe_separation(contact, state)}, A/A0 {contact.area_fraction(state):.4e}, "
+                f"p {contact.pressure(state):.4g} Pa, {contact.spot_count(state)} spots"
             )
 
     def require_valid_state(
@@ -138,9 +138,8 @@ class PathProgress:
         ends = all(isinstance(each, (InsideJump, BeyondModel)) for each in failures)
         by_physics = ends or (sticky and contact.largest_area_fraction < 1)
         return (BeyondModel if by_physics else NotConverged)(
-            f"at a mean separation of {state.separation / contact.rms_height:.4f} h_rms, "
-            f"A/A0 = {contact.area_fraction(state):.3g}, after {self.reached} of {self.total} stops: "
-            f"{'; '.join(map(str, failures))}{sticky}"
+            f"at {describe_separation(contact, state)}, A/A0 = {contact.area_fraction(state):.3g}, "
+            f"after {self.reached} of {self.total} stops: {'; '.join(map(str, failures))}{sticky}"
         )
 
 

@@ -3,8 +3,8 @@
 from pydantic import Field, model_validator
 
 from icha.path.targets import QUANTITIES
-from icha.support.rules import INDENTATIONS
-from icha.support.values import Force, Length, Positive, Pressure, Section, exactly_one, number, quantity
+from icha.support.rules import INDENTATIONS, NUMBER
+from icha.support.values import Force, Length, Pressure, Section, exactly_one, number, quantity
 
 ReducedPressure = number(QUANTITIES["reduced_pressure"].rule)
 AreaFraction = number(QUANTITIES["area_fraction"].rule)
@@ -12,12 +12,12 @@ Indentation = quantity(INDENTATIONS, "1 um")
 
 
 class Snapshot(Section):
-    """A state whose spots and distributions of gap and pressure are saved. Give exactly one key."""
+    """A state whose spots and distributions are saved. Exactly one key must be given. Tensile loads are negative."""
 
     reduced_pressure: ReducedPressure | None = Field(  # type: ignore[valid-type]
         default=None, description="Reduced pressure p/(E* h'rms) of the state."
     )
-    relative_load: Positive | None = Field(
+    relative_load: number(NUMBER) | None = Field(  # type: ignore[valid-type]
         default=None, description="Relative load p/E* = F/(E* A0) of the state, independent of the surface slope."
     )
     area_fraction: AreaFraction | None = Field(  # type: ignore[valid-type]

@@ -1,5 +1,7 @@
 """Targets (in messages: stops) of a path as functions of the contact state, and the search for states at targets."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -8,6 +10,7 @@ import numpy as np
 
 from icha.contact.model import PRESSURE, ContactModel, Control, NotConverged, State
 from icha.path.targets import LEAST_PRESSURE, MEAN_SEPARATION, Target
+from icha.support.formatting import format_quantity
 
 # Largest relative excess over a target that rounding can cause.
 SAME_EXCESS = 1e-9
@@ -27,24 +30,44 @@ _LARGEST_BEND = 4.0
 
 @dataclass(frozen=True, eq=False)
 class TargetFunction:
-    """Target of a path with a contact; `excess` is a function of the state that is zero at the target."""
+    """Target of a path with a contact; `excess` is a function of the state that is zero at the target.
+
+    Attributes
+    ----------
+    target : target of the path.
+    contact : contact model.
+    rises : True for a load of zero or tension on loading. States without contact, whose load is zero, then count as
+        below the target, and the load may fall past the target before it rises to it.
+    """
 
     target: Target
     contact: ContactModel
+    rises: bool = False
+
+    @classmethod
+    def on_loading(cls, target: Target, contact: ContactModel) -> TargetFunction:
+        """Return the function of a target that ends or interrupts loading."""
+        return cls(target, contact, rises=contact.adhesive and target.needs_adhesion)
 
     def excess(self, state: State) -> float:
         """Return the excess of a state over the target, relative to the absolute value of the target.
 
         The excess rises on loading. For a separation it is relative to h_rms, and for zero load to LEAST_PRESSURE. For
-        a contact radius it is the excess of the area.
+        a contact radius it is the excess of the area. With `rises`, it is -1 without contact.
         """
         quantity, value = self.target.quantity, self.target.value
+        if self.rises and not self.contact.spot_count(state):
+            return -1.0
         if quantity.controlled is None:
             return (self.separation - state.separation) / self.contact.rms_height
         if quantity.controlled == PRESSURE:
             least = LEAST_PRESSURE * self.contact.pressure_unit / quantity.scale(self.contact)
             return (quantity.evaluate(self.contact, state) - value) / (abs(value) or least)
         return self.contact.area_fraction(state) / quantity.prescribed(self.contact, value) - 1
+
+    def is_passed(self, before: State, after: State, direction: int) -> bool:
+        """Return whether a step passes the target; `direction` is the sign of the change of the separation."""
+        return direction * self.excess(after) <= 0 and not (self.rises and self.excess(before) >= 0)
 
     @property
     def separation(self) -> float:
@@ -88,11 +111,20 @@ def sort_targets(targets: Iterable[TargetFunction], direction: int) -> list[Targ
 
 
 def next_of_each_kind(pending: Iterable[TargetFunction]) -> list[TargetFunction]:
-    """Return a list of the first target of every kind in a sorted list of targets."""
+    """Return those targets of a sorted list that a path may meet next: the first of every kind, and all that `rise`."""
+    rising = [each for each in pending if each.rises]
     first: dict[str, TargetFunction] = {}
     for each in pending:
-        first.setdefault(each.target.kind, each)
-    return list(first.values())
+        if not each.rises:
+            first.setdefault(each.target.kind, each)
+    return [*rising, *first.values()]
+
+
+def describe_separation(contact: ContactModel, state: State) -> str:
+    """Return the separation of a state in words: an indentation if the surface has a shape, otherwise in h_rms."""
+    if contact.shape is not None:
+        return f"an indentation of {format_quantity(-state.separation, 'm')}"
+    return f"a mean separation of {state.separation / contact.rms_height:.4f} h_rms"
 
 
 # A jump of at most this number of cells is due to the grid.
@@ -113,10 +145,9 @@ class InsideJump(NotConverged):
             else "remove this target, or give the path by mean separations"
         )
         super().__init__(
-            f"{target.target.describe()} lies inside a jump: at a mean separation of "
-            f"{after.separation / contact.rms_height:.4f} h_rms the contact area jumps from {area_before:.3g} to "
-            f"{area_after:.3g} of the nominal area, and the branch after the jump does not reach back to the target; "
-            f"{remedy}"
+            f"{target.target.describe()} lies inside a jump: at {describe_separation(contact, after)} the contact area "
+            f"jumps from {area_before:.3g} to {area_after:.3g} of the nominal area, and the branch after the jump does "
+            f"not reach back to the target; {remedy}"
         )
         self.target, self.before = target, before
 
@@ -195,7 +226,8 @@ def find_first_target(
 ) -> tuple[TargetFunction | None, State]:
     """Find the target that the path meets first between two states, and the state at this target.
 
-    If there is no target between the states, return None and `after`. Raise the errors of `find_target_state`.
+    If there is no target between the states, return None and `after`. Raise the errors of `find_target_state`. A
+    target that `rises` and lies inside the jump is left for later, because the tension may still increase.
 
     targets : targets not met at `before`; of a sorted list, the next one of each kind is enough.
     direction : sign of the change of the separation: -1 on loading, 1 on unloading.
@@ -204,8 +236,13 @@ def find_first_target(
     for target in targets:
         if abs(target.excess(after)) <= target.tolerance and first[0] is None:
             first = target, after
-        elif direction * target.excess(after) <= 0:
-            found = find_target_state(target, before, after)
+        elif target.is_passed(before, after, direction):
+            try:
+                found = find_target_state(target, before, after)
+            except InsideJump:
+                if target.rises:
+                    continue
+                raise
             if first[0] is None or direction * (found.separation - first[1].separation) < 0:
                 first = target, found
     return first

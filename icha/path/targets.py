@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 from icha.contact.model import AREA_FRACTION as CONTROLLED_AREA
 from icha.contact.model import PRESSURE, ContactModel, Control, State
-from icha.support.formatting import html_table
-from icha.support.rules import FORCES, INDENTATIONS, LENGTH, NUMBER, POSITIVE, PRESSURES, FloatRange
+from icha.support.formatting import format_quantity, html_table
+from icha.support.rules import FORCES, INDENTATIONS, LENGTH, NUMBER, PRESSURES, FloatRange
 
 # Largest reduced pressure and area fraction of a target with the asperity model. At larger values the spots are not
 # separate, and without adhesion the mean gap soon becomes zero.
@@ -78,18 +78,18 @@ REDUCED_PRESSURE, RELATIVE_LOAD = "reduced_pressure", "relative_load"
 NOMINAL_PRESSURE, FORCE = "pressure", "force"
 AREA_FRACTION, CONTACT_RADIUS = "area_fraction", "contact_radius"
 MEAN_SEPARATION, INDENTATION = "mean_separation", "indentation"
-_PRESSURES = FloatRange(least=LEAST_PRESSURE, most=LARGEST_REDUCED_PRESSURE)
+_PRESSURES = FloatRange(most=LARGEST_REDUCED_PRESSURE)
 _AREAS = FloatRange(least=LEAST_AREA, most=1.0)
 # Ranges of targets with the asperity model.
 ASPERITY_RANGES = {
-    REDUCED_PRESSURE: FloatRange(least=LEAST_PRESSURE, most=MAX_REDUCED_PRESSURE, model_ends=True),
+    REDUCED_PRESSURE: FloatRange(most=MAX_REDUCED_PRESSURE, model_ends=True),
     AREA_FRACTION: FloatRange(least=LEAST_AREA, most=MAX_AREA_FRACTION, model_ends=True),
 }
 QUANTITIES = {
     quantity.name: quantity
     for quantity in (
         TargetQuantity(REDUCED_PRESSURE, _PRESSURES, PRESSURE, lambda contact: contact.pressure_unit),
-        TargetQuantity(RELATIVE_LOAD, POSITIVE, PRESSURE, lambda contact: contact.contact_modulus),
+        TargetQuantity(RELATIVE_LOAD, NUMBER, PRESSURE, lambda contact: contact.contact_modulus),
         TargetQuantity(AREA_FRACTION, _AREAS, CONTROLLED_AREA, lambda contact: 1.0),
         TargetQuantity(MEAN_SEPARATION, LENGTH, None, lambda contact: 1.0),
         TargetQuantity(NOMINAL_PRESSURE, PRESSURES, PRESSURE, lambda contact: 1.0),
@@ -117,6 +117,9 @@ BETWEEN = "path"
 # Units of the values of targets with a unit, by kind; the values of all other kinds have no unit.
 UNITS = {name: each.rule.unit for name, each in QUANTITIES.items() if each.rule.unit != "1"} | {BETWEEN: "m"}
 
+# Reason for refusing loads that need adhesion, after the load in messages.
+WITHOUT_ADHESION = "is not a load of a contact without adhesion; expected a positive load, or a positive surface_energy"
+
 SEPARATION_CONTROL, LOAD_CONTROL = "separation", "load"
 
 
@@ -140,9 +143,15 @@ class Target:
         """Prescribed quantity; `KeyError` for the kind BETWEEN."""
         return QUANTITIES[self.kind]
 
+    @property
+    def needs_adhesion(self) -> bool:
+        """True for a load of zero or a tension: only adhesion gives a contact with such a load."""
+        return self.kind in LOADS and self.value <= 0
+
     def describe(self) -> str:
-        """Return a text such as `area_fraction = 0.01`, for messages, with six digits and without a unit."""
-        return f"{self.kind} = {self.value:g}"
+        """Return a text such as `area_fraction = 0.01` or `force = -300 µN`, for messages."""
+        unit = UNITS.get(self.kind)
+        return f"{self.kind} = {format_quantity(self.value, unit) if unit else f'{self.value:g}'}"
 
 
 @dataclass(frozen=True, init=False)
@@ -151,27 +160,29 @@ class Path:
 
     Parameters
     ----------
-    reduced_pressures : values of p/(E* h'_rms), increasing, in [1e-12, 100]; with the asperity model at most 0.15.
+    reduced_pressures : values of p/(E* h'_rms), increasing, at most 100; with the asperity model at most 0.15.
     area_fractions : values of A/A0, increasing, in [1e-9, 1]; with the asperity model at most 0.25.
     mean_separations : values of u in m, decreasing, in [1e-24, 1e9].
-    pressures : values of the nominal pressure F/A0 in Pa, increasing, in [1e-30, 1e30].
-    forces : values of the normal force in N, increasing, in [1e-30, 1e30].
+    pressures : values of the nominal pressure F/A0 in Pa, increasing, in [-1e30, 1e30].
+    forces : values of the normal force in N, increasing, in [-1e30, 1e30].
     indentations : values of -u in m, increasing, in [-1e9, 1e9]; negative before the undeformed surfaces meet.
-    contact_radii : values of sqrt(A/pi) in m, increasing, in [1e-24, 1e9]. Give exactly one of these seven lists.
+    contact_radii : values of sqrt(A/pi) in m, increasing, in [1e-24, 1e9]. Give exactly one of these seven lists. Loads
+        of zero and tensile (negative) loads need adhesion: the path meets them in contact, where the load first rises
+        to them during the first loading. If the jump into contact passes such a load, the path goes back to it.
     snapshots : pairs (kind, value), in any order, of states of the first loading whose distributions and spots are
         saved. The kind is "reduced_pressure", "relative_load" (F/(E* A0)), "area_fraction", "mean_separation" (m),
         "pressure" (Pa), "force" (N), "indentation" (m) or "contact_radius" (m). A snapshot is an additional target
         unless the list contains the same kind and value. Snapshots are in the dataset in the order in which the path
         reaches them. Default: the last target of the list.
     turning_points : pairs (kind, value) at which the path turns after its last target: the first one ends unloading,
-        the second one ends loading, and so on. The kinds are those of snapshots. Loads that end unloading may be
-        tensile (negative) or zero.
+        the second one ends loading, and so on. The kinds are those of snapshots.
     unload : whether the path ends with complete separation. The last unloading meets again each target between its
         start and complete separation, except targets inside jumps. If the number of turning points is odd, the last one
         lies on the last unloading: there the path does not turn, but continues to complete separation.
     control : "separation": the mean separation is prescribed. "load": the load is prescribed. All targets and turning
-        points must then be loads, and the path must unload or have turning points. Load control follows the curve of
-        separation control, but jumps at constant load where the pressure falls on loading or rises on unloading.
+        points must then be loads, the targets positive, and the path must unload or have turning points. Load control
+        follows the curve of separation control, but jumps at constant load where the pressure falls on loading or rises
+        on unloading.
     max_step : longest change of the mean separation between two equilibria, in units of h_rms, in [1e-4, 0.5].
 
     Raises
@@ -222,7 +233,7 @@ class Path:
         turns = _validate_turning_points(turning_points, targets[-1])
         targets += [Target(*pair, True) for pair in saved if pair not in listed]
         if control == LOAD_CONTROL:
-            _require_loads((*targets, *turns), unload or bool(turns))
+            _require_loads(targets, turns, unload)
         # A frozen dataclass sets its fields this way.
         vars(self).update(
             targets=tuple(targets), turning_points=turns, unload=unload, control=control, max_step=max_step
@@ -250,10 +261,10 @@ class Path:
 
 def _validate_list(kind, values):
     """Return the values of a list of targets as floats; raise `ValueError` if a value is out of range or order."""
-    name, rule, falls = QUANTITIES[kind].plural, QUANTITIES[kind].rule, kind == MEAN_SEPARATION
+    name, falls = QUANTITIES[kind].plural, kind == MEAN_SEPARATION
     if isinstance(values, str | bytes) or not isinstance(values, Iterable):
         raise ValueError(f"{name}: expected a list of numbers, got {values!r}")
-    values = [rule.validate(f"{name}[{k}]", value) for k, value in enumerate(values)]
+    values = [_validate_value(f"{name}[{k}]", kind, value) for k, value in enumerate(values)]
     if not values:
         raise ValueError(f"{name}: the list is empty; expected at least one number")
     for k, (one, following) in enumerate(itertools.pairwise(values), start=1):
@@ -267,7 +278,7 @@ def _validate_snapshots(snapshots):
     """Return a list of (kind, value) of all snapshots; raise `ValueError` if a value is out of range or repeated."""
     saved = []
     for label, kind, value in _label_pairs("snapshots", snapshots):
-        pair = kind, QUANTITIES[kind].rule.validate(label, value)
+        pair = kind, _validate_value(label, kind, value)
         if pair in saved:
             raise ValueError(f"{label}: {kind} {value!r} is given twice; remove one of them")
         saved.append(pair)
@@ -284,11 +295,7 @@ def _validate_turning_points(turning_points, previous):
     turns = []
     for k, (label, kind, value) in enumerate(_label_pairs("turning_points", turning_points)):
         unloading = k % 2 == 0
-        rule = NUMBER if unloading and kind in LOADS else QUANTITIES[kind].rule
-        value = rule.validate(label, value)
-        if kind == REDUCED_PRESSURE and 0 < abs(value) < LEAST_PRESSURE:
-            expected = f"expected 0, or an absolute value of at least {LEAST_PRESSURE:g}"
-            raise ValueError(f"{label}: {value!r} is too close to zero; {expected}")
+        value = _validate_value(label, kind, value)
         falls = unloading != (kind == MEAN_SEPARATION)
         if kind == previous.kind and not (value < previous.value if falls else value > previous.value):
             leg, side = "unloading" if unloading else "loading", "less" if falls else "more"
@@ -297,6 +304,15 @@ def _validate_turning_points(turning_points, previous):
         previous = Target(kind, value)
         turns.append(previous)
     return tuple(turns)
+
+
+def _validate_value(label, kind, value):
+    """Return the value of a target as a float; raise `ValueError` if it is out of range or too close to zero."""
+    value = QUANTITIES[kind].rule.validate(label, value)
+    if kind == REDUCED_PRESSURE and 0 < abs(value) < LEAST_PRESSURE:
+        expected = f"expected 0, or an absolute value of at least {LEAST_PRESSURE:g}"
+        raise ValueError(f"{label}: {value!r} is too close to zero; {expected}")
+    return value
 
 
 def _label_pairs(name, pairs):
@@ -314,13 +330,13 @@ def _label_pairs(name, pairs):
         yield label, kind, value
 
 
-def _require_loads(targets, unloads):
-    """Raise `ValueError` if a path under load control has targets that are not loads, or has no unloading."""
-    for target in targets:
-        if target.kind not in LOADS:
-            expected = "expected only loads as targets and turning points"
+def _require_loads(targets, turns, unload):
+    """Raise `ValueError` if a path under load control has targets that are not positive loads, or has no unloading."""
+    for target in (*targets, *turns):
+        if target.kind not in LOADS or (target.needs_adhesion and target in targets):
+            expected = "expected positive loads as targets, and loads as turning points"
             raise ValueError(f"control: {LOAD_CONTROL!r} with the target {target.describe()}; {expected}")
-    if not unloads:
+    if not (unload or turns):
         reason = (
             f"{LOAD_CONTROL!r} without unloading changes nothing, because the path stops where it first reaches a load"
         )

@@ -45,10 +45,12 @@ class FloatRange:
     def expected(self) -> str:
         """Description of the valid values, for use after "expected" in messages."""
         if self.above is None and self.least is None:
-            return "a number" if self.most is None else f"a number of at most {_short(self.most)}"
-        if self.most is None:
-            return "a number greater than 0" if self.least is None else "a number, 0 or greater"
-        return f"a number in {self.interval}" + (", where the asperity model holds" if self.model_ends else "")
+            bounds = "a number" if self.most is None else f"a number of at most {_short(self.most)}"
+        elif self.most is None:
+            bounds = "a number greater than 0" if self.least is None else "a number, 0 or greater"
+        else:
+            bounds = f"a number in {self.interval}"
+        return bounds + (", where the asperity model holds" if self.model_ends else "")
 
     def validate(self, name: str, value) -> float:
         """Return a value as a float; for invalid values, raise ValueError with the name of the argument."""
@@ -95,8 +97,9 @@ POSITIVE = FloatRange(above=0)
 # Bounds far beyond physical lengths; within the bounds, products of powers of lengths neither overflow nor underflow.
 LENGTH = FloatRange("m", least=1e-24, most=1e9)
 INDENTATIONS = FloatRange("m", least=-1e9, most=1e9)
-FORCES = FloatRange("N", least=1e-30, most=1e30)
-PRESSURES = FloatRange("Pa", least=1e-30, most=1e30)
+# Loads are negative in tension.
+FORCES = FloatRange("N", least=-1e30, most=1e30)
+PRESSURES = FloatRange("Pa", least=-1e30, most=1e30)
 
 # Surfaces.
 HURST = FloatRange(above=0, most=1)

@@ -172,10 +172,10 @@ def test_progress_reports_every_target(surface):
         ({"reduced_pressures": []}, "reduced_pressures: the list is empty"),
         ({"reduced_pressures": [1e-2, 1e-3]}, r"reduced_pressures\[1\].*increasing"),
         ({"mean_separations": [1e-6, 2e-6]}, r"mean_separations\[1\].*decreasing"),
-        ({"forces": [0.0, 1.0]}, r"forces\[0\]: 0.0 must be .* \(in N\)"),
+        ({"forces": [0.0, 1e31]}, r"forces\[1\]: 1e\+31 must be .* \(in N\)"),
         ({"indentations": [1e-6, -1e-6]}, r"indentations\[1\].*increasing"),
         ({"contact_radii": [0.0]}, r"contact_radii\[0\]: 0.0 must be .* \(in m\)"),
-        ({"reduced_pressures": [101.0]}, r"reduced_pressures\[0\]: .* in \[1e-12, 100\]"),
+        ({"reduced_pressures": [101.0]}, r"reduced_pressures\[0\]: .* at most 100"),
         ({"reduced_pressures": [0.1], "unload": 1}, "unload: expected True or False, got 1"),
         ({"reduced_pressures": [0.1], "max_step": None}, "max_step"),
         ({"reduced_pressures": [0.1], "snapshots": [("load", 0.1)]}, r"snapshots\[0\].*kind"),
@@ -197,9 +197,9 @@ def test_progress_reports_every_target(surface):
                 ([("reduced_pressure", 0.1)], r"^turning_points\[0\]: 0.1 .*0\.1"),
                 ([("reduced_pressure", -1e-80)], r"^turning_points\[0\]: -1e-80"),
                 ([("reduced_pressure", 0.05), ("reduced_pressure", 0.04)], r"^turning_points\[1\]: 0.04"),
-                ([("reduced_pressure", -0.01), ("reduced_pressure", -0.001)], r"^turning_points\[1\]"),
+                ([("reduced_pressure", -0.01), ("reduced_pressure", -0.02)], r"^turning_points\[1\]"),
                 ([("mean_separation", -1e-6)], r"^turning_points\[0\]: -1e-06"),
-                ([("force", -1.0), ("force", -0.5)], r"^turning_points\[1\]: -0.5 .* \(in N\)"),
+                ([("force", -1e31)], r"^turning_points\[0\]: -1e\+31 .* \(in N\)"),
             )
         ),
         *(
@@ -278,9 +278,9 @@ def test_a_path_that_lasts_reports_where_it_is_between_its_targets(surface, monk
     lines = []
     simulate(surface, BARE, Path([1e-2], unload=True, max_step=0.1), progress=lines.append)
     first, *_ = lines
-    assert first.startswith("loading, 0 of 1 stops, separation ") and " Pa, " in first and "A/A0 " in first
+    assert first.startswith("loading, 0 of 1 stops, at a mean separation of ") and " Pa, " in first and "A/A0 " in first
     assert any(line.startswith("unloading, 1 of 1 stops, ") for line in lines)
     monkeypatch.setattr("icha.path.loading.REPORT_AFTER", 60.0)
     lines.clear()
     simulate(surface, BARE, Path([1e-2]), progress=lines.append)
-    assert len(lines) == 1 and lines[0].startswith("stop 1 of 1: reduced_pressure = 0.01, separation ")
+    assert len(lines) == 1 and lines[0].startswith("stop 1 of 1: reduced_pressure = 0.01, at a mean separation of ")
