@@ -123,7 +123,7 @@ class Surface:
 
     def detrended(self, degree: int = 1) -> Surface:
         """Return a free square without its tilt (`degree` 1), or also without its curvature (`degree` 2)."""
-        from icha.surfaces.measured.topography import without_trend
+        from icha.surfaces.measured.defects import without_trend
 
         if degree not in (1, 2):
             raise ValueError(f"degree: {degree!r} must be 1 or 2")

@@ -56,6 +56,46 @@ def test_outliers_are_found_where_they_are(size):
     assert largest == pytest.approx(abs(size), rel=0.35)
 
 
+@pytest.mark.parametrize("share", [0.02, 0.08, 0.19])
+def test_single_outliers_are_found_at_any_share_that_can_be_replaced(examined, share):
+    heights, places = PLAIN.copy(), RNG.random(PLAIN.shape) < share
+    heights[places] += RNG.uniform(8, 60, np.count_nonzero(places)) * RMS
+    found = examined(heights, outliers="remove").surface
+    assert found.rms_slope == pytest.approx(examined(PLAIN).surface.rms_slope, rel=0.01)
+
+
+@pytest.mark.parametrize("height", [1e30, -1e300, 3.4e38])
+def test_heights_larger_than_all_digits_of_a_float_are_outliers(examined, height):
+    """The trend and the limit for flat surfaces are those of the other heights."""
+    heights = PLAIN + 3 * RMS * X
+    heights[5, 7] = height
+    found, plain = (examined(z, outliers="remove").surface for z in (heights, PLAIN + 3 * RMS * X))
+    np.testing.assert_allclose(found.heights, plain.heights, atol=0.1 * RMS)
+    assert found.rms_slope == pytest.approx(plain.rms_slope, rel=0.01)
+
+
+@pytest.mark.parametrize("width", [4, 6, 9, 13])
+def test_dust_of_any_width_is_found_and_replaced(examined, width):
+    dust = np.hypot(Y - 0.2, X + 0.1) < width / GRID
+    heights = np.where(dust, PLAIN + 40 * RMS, PLAIN)
+    outliers, _ = find_outliers(heights)
+    assert outliers[dust].all() and np.count_nonzero(outliers[~dust]) < 20
+    found = examined(heights, outliers="remove").surface
+    assert found.rms_slope == pytest.approx(examined(PLAIN).surface.rms_slope, rel=0.03)
+
+
+def test_peaks_and_pits_without_steep_edges_are_no_outliers():
+    for heights in (np.minimum(PLAIN, 0.0), -np.abs(PLAIN), PLAIN + 8 * RMS * np.exp(-20 * (X**2 + Y**2))):
+        assert not find_outliers(heights)[0].any()
+
+
+def test_more_outliers_than_can_be_replaced_are_refused(examined):
+    heights = np.where(RNG.random(PLAIN.shape) < 0.3, 40 * RMS, PLAIN)
+    with pytest.raises(UnfitTopography, match=r"of 4096 points that stand out .* at most 20 %. Write keep") as raised:
+        examined(heights, outliers="remove")
+    assert raised.value.key == "outliers"
+
+
 def test_offsets_of_lines_are_found_in_their_direction_and_removed():
     stepped = PLAIN + OFFSETS
     assert line_offsets(stepped) == {"lines": pytest.approx(2 * RMS * np.sqrt(2), rel=0.2)}

@@ -22,7 +22,14 @@ import scipy.sparse.linalg
 from icha.support import formatting
 from icha.support.checksums import sha256_of
 from icha.support.input_files import TooLarge, require_room
-from icha.surfaces.measured.defects import Defects, find_outliers, level_lines, line_offsets
+from icha.surfaces.measured.defects import (
+    MOST_OUTLIERS,
+    Defects,
+    find_outliers,
+    level_lines,
+    line_offsets,
+    without_trend,
+)
 from icha.surfaces.measured.scan import Scan, load_scan
 from icha.surfaces.measured.settings import MIRROR, WINDOW, Preparation, UnfitTopography
 from icha.surfaces.square import problem_with_heights
@@ -87,9 +94,8 @@ def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> Prepar
     scan = load_scan(file, settings)
     touching = scan.heights if settings.touches_first == "high" else -scan.heights
     square = crop_square(scan.after(touching, f"{settings.touches_first} numbers touch first"), settings)
-    prepared = square
+    cleaned = prepared = remove_outliers(square, settings)
     for step in (
-        remove_outliers,
         level,
         remove_trend,
         fill_missing_points,
@@ -97,7 +103,7 @@ def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> Prepar
         filter_short_waves,
     ):
         prepared = step(prepared, settings)
-    refuse_flat(prepared, square, settings)
+    refuse_flat(prepared, cleaned, settings)
     surface, steps = treat_edges(prepared, settings)
     return PreparedTopography(
         surface=surface,
@@ -151,15 +157,21 @@ def crop_square(scan: Scan, settings: Preparation) -> Scan:
 
 def remove_outliers(scan: Scan, settings: Preparation) -> Scan:
     """Replace outliers by the solution of Laplace's equation, if the setting `outliers` is "remove"."""
-    if settings.outliers != "remove":
+    if settings.outliers != "remove" or not np.isfinite(scan.heights).any():
         return scan
-    outliers, largest = find_outliers(without_trend(scan.heights, 1))
-    if not outliers.any():
+    outliers, largest = find_outliers(scan.heights)
+    count = int(np.count_nonzero(outliers))
+    if count > MOST_OUTLIERS * outliers.size:
+        raise UnfitTopography(
+            "outliers",
+            f"cannot remove {count} of {outliers.size} points that stand out from the points around them; expected at "
+            f"most {100 * MOST_OUTLIERS:g} %. Write keep if they belong to the surface, or crop the scan",
+        )
+    if not count:
         return scan
     heights, gaps = scan.heights.copy(), outliers | ~np.isfinite(scan.heights)
     heights[gaps] = _harmonic(heights, gaps, periodic=settings.boundary == PERIODIC)
     heights[gaps & ~outliers] = np.nan
-    count = int(np.count_nonzero(outliers))
     share = formatting.share(count, outliers.size)
     return scan.after(
         heights, f"{count} outliers replaced, {share} of the points, the largest of {largest:.3g} rms heights"
@@ -178,9 +190,8 @@ def level(scan: Scan, settings: Preparation) -> Scan:
 
 def defects_of(scan: Scan) -> Defects:
     """Return the defects of a scan, before they are removed."""
-    level = without_trend(scan.heights, 1)
-    outliers, largest = find_outliers(level)
-    level = without_trend(np.where(outliers, np.nan, level), 1)
+    outliers, largest = find_outliers(scan.heights)
+    level = without_trend(np.where(outliers, np.nan, scan.heights), 1)
     curvature = 1 - float(np.nanvar(without_trend(level, 2)) / (np.nanvar(level) or 1.0))
     return Defects(int(np.count_nonzero(outliers)), largest, line_offsets(level), curvature)
 
@@ -196,26 +207,10 @@ def remove_trend(scan: Scan, settings: Preparation) -> Scan:
     return scan.after(without_trend(scan.heights, degree), f"{settings.detrend} removed")
 
 
-def without_trend(heights: np.ndarray, degree: int) -> np.ndarray:
-    """Return heights without the polynomial of x and y of some degree that fits the known heights best."""
-    known = np.isfinite(heights)
-    rows, columns = heights.shape
-    powers = [(i, j) for i in range(degree + 1) for j in range(degree + 1 - i)]
-    y, x = (np.vander(np.linspace(-1, 1, n), 2 * degree + 1, increasing=True) for n in (rows, columns))
-    # Sum the products of powers over the known points by matrix products, which need little memory.
-    moments = y.T @ known.astype(float) @ x
-    weighted = y.T @ np.where(known, heights, 0.0) @ x
-    matrix = np.array([[moments[i + k, j + m] for k, m in powers] for i, j in powers])
-    right = np.array([weighted[i, j] for i, j in powers])
-    coefficients = np.zeros((degree + 1, degree + 1))
-    coefficients[tuple(np.transpose(powers))] = np.linalg.lstsq(matrix, right, rcond=None)[0]
-    return heights - y[:, : degree + 1] @ coefficients @ x[:, : degree + 1].T
-
-
-def refuse_flat(prepared: Scan, square: Scan, settings: Preparation) -> None:
-    """Raise UnfitTopography if the prepared heights are only rounding errors of the original heights."""
-    known = np.isfinite(square.heights)
-    if np.ptp(prepared.heights) <= _FLAT * np.nanmax(np.abs(square.heights), where=known, initial=0.0):
+def refuse_flat(prepared: Scan, cleaned: Scan, settings: Preparation) -> None:
+    """Raise UnfitTopography if the prepared heights are only rounding errors of the heights without outliers."""
+    known = np.isfinite(cleaned.heights)
+    if np.ptp(prepared.heights) <= _FLAT * np.nanmax(np.abs(cleaned.heights), where=known, initial=0.0):
         apart = "" if settings.detrend == "none" else ", apart from the trend that is removed"
         raise UnfitTopography("path", f"contains heights that are all the same{apart}; expected a rough surface")
 
