@@ -62,10 +62,10 @@ def find_outliers(heights: np.ndarray) -> tuple[np.ndarray, float]:
     Mask of the outliers, and the largest deviation of an outlier divided by the robust rms height.
     """
     known = np.isfinite(heights)
-    y, x = np.indices(heights.shape, sparse=True)
     # Medians, because one outlier may exceed all other heights by the rounding error of a float.
     slope_y, slope_x = (np.nan_to_num(np.nanmedian(np.diff(heights, axis=axis))) for axis in (0, 1))
-    level = heights - slope_y * y - slope_x * x
+    rows, columns = heights.shape
+    level = heights - slope_y * np.arange(rows)[:, None] - slope_x * np.arange(columns)
     level = np.where(known, level, np.nanmedian(level[known]))
     medians = [median_filter(level, _WINDOW, mode="reflect")]
     plain = known & ~_is_unusual(np.abs(level - medians[0]), known)
