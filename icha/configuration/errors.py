@@ -10,6 +10,7 @@ from typing import Annotated, Any, Union, get_args, get_origin
 from pydantic import BaseModel
 
 from icha.configuration.campaign import Campaign
+from icha.configuration.studies import Study
 from icha.configuration.surfaces import SURFACE_KINDS
 from icha.figures.own_figure import OwnFigure
 from icha.support.formatting import printable
@@ -24,15 +25,48 @@ _FORMER_KEYS = {
     ("Study", "united_until"): "was removed, because coalesced spots now split when their parts would no longer "
     "overlap. Remove the key",
 }
-# Usual names of keys that have another name here.
-_OTHER_NAMES = {
-    "work_of_adhesion": "surface_energy",
-    "adhesion_energy": "surface_energy",
-    "elastic_modulus": "contact_modulus",
-    "youngs_modulus": "bodies",
-    "roll_off": "rolloff_wavelength",
-    "load": "pressures",
-}
+# Usual words for quantities that have another key here: keys, of which one exists in the section or in a study; words;
+# and how the quantities are related. The relations to the correlation length follow from the spectrum with roll-off:
+# docs/faq.md. Those of Ra and Rdq hold for Gaussian heights and for isotropic surfaces (ISO 21920-2, ISO 25178-2).
+_WORDS = (
+    (
+        ("rolloff_wavelength",),
+        "correlation_length autocorrelation_length acl",
+        "about 4 times the length at which the autocorrelation falls to 1/e, for hurst = 0.8; 5 times for 0.5",
+    ),
+    (
+        ("rolloff_wavelength",),
+        "sal",
+        "about 3 times Sal, the length at which the autocorrelation falls to 0.2, for hurst = 0.8",
+    ),
+    (("rolloff_wavelength",), "roll_off rolloff roll_off_wavelength lambda_r lambda_0 longest_wavelength", ""),
+    (
+        ("short_wavelength", "cutoff"),
+        "cutoff_wavelength cutoff cut_off shortest_wavelength smallest_wavelength lambda_s lambda_1",
+        "the shortest wavelength of the roughness",
+    ),
+    (("hurst",), "hurst_exponent h", ""),
+    (("hurst",), "fractal_dimension", "3 minus the fractal dimension of the surface"),
+    (
+        ("rms_heights",),
+        "rq sq roughness rms_roughness rms_height sigma h_rms hrms",
+        "Sq, the rms height over the area, for each surface of a study",
+    ),
+    (("rms_heights",), "ra sa", "Sq, which is 1.25 times Sa = Ra for Gaussian heights"),
+    (("rms_slopes", "rms_slope"), "sdq rms_slope rms_gradient slope", "Sdq, the rms slope |grad h| over the area"),
+    (("rms_slopes", "rms_slope"), "rdq", "Sdq, which is √2 times the rms slope Rdq of profiles of isotropic surfaces"),
+    (("surface_energy",), "work_of_adhesion adhesion_energy gamma delta_gamma dgamma w", "the work of adhesion Δγ"),
+    (("contact_modulus",), "e_star composite_modulus reduced_modulus effective_modulus", ""),
+    (
+        ("youngs_modulus",),
+        "e young young_modulus youngs elastic_modulus modulus",
+        "Young's modulus; with `poisson_ratio` it gives `contact_modulus`: E* = E/(1 - ν²) on a rigid body",
+    ),
+    (("poisson_ratio",), "nu poisson poissons_ratio poisson_number", ""),
+    (("pressures", "forces"), "load loads", ""),
+    (("forces",), "force normal_force normal_forces", ""),
+)
+_OTHER_NAMES = {word: (keys, relation) for keys, words, relation in _WORDS for word in words.split()}
 # Messages for users, by pydantic's type of error. The messages of pydantic itself are for programmers.
 _NOT_A_SECTION = "is not a section; expected a mapping of keys to values"
 _REASONS = {
@@ -107,10 +141,19 @@ def _reason_for_key(kind: str, location: tuple) -> str:
         return f"the key is missing; expected: {' '.join(str(section.model_fields[name].description).split())}"
     if reason := _FORMER_KEYS.get((section.__name__, name)):
         return reason
-    similar = difflib.get_close_matches(str(name), section.model_fields, 1)
-    similar = [each for each in [_OTHER_NAMES.get(name)] if each in section.model_fields] or similar
-    hint = f" (did you mean {similar[0]!r}?)" if similar else ""
-    return f"unknown key{hint}; expected one of {', '.join(sorted(section.model_fields))}"
+    return f"unknown key{_hint(str(name), section)}; expected one of {', '.join(sorted(section.model_fields))}"
+
+
+def _hint(name: str, section: type[BaseModel]) -> str:
+    """Return the key that is meant by an unknown key of a section, in parentheses; empty if there is none."""
+    word = re.sub(r"[\s-]+", "_", name.replace("'", "").lower())
+    keys, relation = _OTHER_NAMES.get(word, ((), ""))
+    because = f" {relation[0].upper()}{relation[1:]}" if relation else ""
+    known = [key for key in keys if key in section.model_fields]
+    if not known and keys and keys[0] in Study.model_fields:
+        return f" (did you mean `{keys[0]}` of a study?{because})"
+    similar = known or difflib.get_close_matches(name, section.model_fields, 1)
+    return f" (did you mean {similar[0]!r}?{because if known else ''})" if similar else ""
 
 
 def _without_tags(location: tuple) -> tuple:

@@ -60,6 +60,28 @@ _Bodies = Annotated[
 ]
 
 
+def _bodies_of(content: Mapping) -> Any:
+    """Return the value of `bodies` of a material, with the material's own Young's modulus and Poisson ratio.
+
+    Raises ValueError if there is no single elastic body with these values.
+    """
+    bodies = content.get("bodies", [{}, RIGID])
+    own = {name: content[name] for name in Body.model_fields if content.get(name) is not None}
+    elastic = [body for body in bodies if isinstance(body, Mapping)] if isinstance(bodies, list) else []
+    if len(elastic) != 1:
+        if "youngs_modulus" in own:
+            raise ValueError(
+                "youngs_modulus: needs `bodies` with one elastic body; expected the word rigid for the other"
+            )
+        return bodies
+    if "youngs_modulus" in own and "poisson_ratio" not in elastic[0] | own:
+        raise ValueError(
+            f"poisson_ratio: the key is missing; expected {POISSON_RATIO.expected} beside `youngs_modulus`, because E* "
+            "= E/(1 - ν²)"
+        )
+    return [body | own if isinstance(body, Mapping) else body for body in bodies]
+
+
 class MaterialSection(Section):
     """Material of the elastic body, and adhesion between this body and the rough surface."""
 
@@ -71,8 +93,14 @@ class MaterialSection(Section):
         description="The two bodies, instead of `contact_modulus`, such as `[{youngs_modulus: 2 MPa, poisson_ratio: "
         "0.5}, rigid]`. Their contact modulus is 1/E* = (1 - ν1²)/E1 + (1 - ν2²)/E2.",
     )
+    youngs_modulus: Modulus | None = Field(
+        default=None,
+        exclude=True,
+        description="Young's modulus E of an elastic body on a rigid one, together with `poisson_ratio`: E* = E/(1 - "
+        "ν²). Beside `bodies` with one elastic body, the two keys replace its values, so that a study can vary them.",
+    )
     contact_modulus: Modulus
-    """Composite elastic modulus E* (contact modulus). Required without `bodies`."""
+    """Composite elastic modulus E* (contact modulus). Required without `bodies` and `youngs_modulus`."""
     surface_energy: SurfaceEnergy
     """Work of adhesion Δγ. The value `0 J/m^2` means no adhesion."""
     interaction_range: Length = Field(default=f"{VAN_DER_WAALS_RANGE * 1e9:g} nm", validate_default=True)
@@ -86,19 +114,21 @@ class MaterialSection(Section):
     """Thickness of an elastic layer that is bonded to a rigid base. Only with `models: [boundary_elements]`. Default: a
     half-space, which is infinitely thick."""
     poisson_ratio: number(POISSON_RATIO) | None = None
-    """Poisson ratio of the layer, from 0 to 0.5; rubber has nearly 0.5. Required with `thickness`. A half-space does
-    not depend on this ratio, because E* is given."""
+    """Poisson ratio of the layer or of the body with `youngs_modulus`, from 0 to 0.5; rubber has nearly 0.5. Required
+    with `thickness`. A half-space with a given E* does not depend on this ratio."""
 
     @model_validator(mode="before")
     @classmethod
     def _combine_bodies(cls, content: Any) -> Any:
         """Compute the contact modulus, and the Poisson ratio of a layer, from the bodies."""
-        if not isinstance(content, Mapping) or content.get("bodies") is None:
+        given = content if isinstance(content, Mapping) else {}
+        key = next((key for key in ("bodies", "youngs_modulus") if given.get(key) is not None), None)
+        if key is None:
             return content
         if "contact_modulus" in content:
-            raise ValueError("bodies: is given beside `contact_modulus`; expected one of both keys")
+            raise ValueError(f"{key}: is given beside `contact_modulus`; expected one of both keys")
         try:
-            bodies = TypeAdapter(_Bodies).validate_python(content["bodies"])
+            bodies = TypeAdapter(_Bodies).validate_python(_bodies_of(content))
         except ValidationError:
             # The field reports the problem. The placeholder prevents a second message about the contact modulus.
             return {**content, "contact_modulus": "1 Pa"}

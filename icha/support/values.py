@@ -139,6 +139,7 @@ def to_si(value, si_unit: str) -> float:
     if isinstance(value, int | float) and not isinstance(value, bool):
         raise ValueError("the unit is missing")
     match = _QUANTITY.fullmatch(value) if isinstance(value, str) and len(value) <= _LONGEST else None
+    _refuse_decimal_comma(value)
     if not match:
         raise ValueError("is not a number with a unit")
     magnitude, unit = match.groups()
@@ -150,11 +151,19 @@ def to_si(value, si_unit: str) -> float:
         raise ValueError("is not finite") from None
 
 
+def _refuse_decimal_comma(value) -> None:
+    """Raise ValueError for a text with a comma in its number, such as `12,5 um`."""
+    if isinstance(value, str) and re.match(r"\s*[+-]?\d*,\d", value[:_LONGEST]):
+        example = value[:_LONGEST].replace(",", ".", 1)
+        raise ValueError(f"has a decimal comma; expected a decimal point, as in {example!r}, and no other separators")
+
+
 def to_number(value) -> float:
     """Convert a number, or text such as `1e-3`, to a finite float; raise ValueError for other values."""
     if isinstance(value, str):
         if len(value) > _LONGEST:
             raise ValueError("is not a number")
+        _refuse_decimal_comma(value)
         if not re.fullmatch(rf"\s*{_NUMBER}\s*", value):
             what = "must be a number without a unit" if _QUANTITY.fullmatch(value) else "is not a number"
             raise ValueError(what)
@@ -355,6 +364,10 @@ def _seeds(value: Any) -> Any:
         if len(found) + last - first >= _MOST_SEEDS:
             raise ValueError(f"{shown}gives more than {_MOST_SEEDS} seeds; {expected}")
         found += range(first, last + 1)
+    if type(value) is int:
+        raise ValueError(
+            f"is a number, but the seeds are a list; expected `1..{value}` for {value} seeds, or `[{value}]`"
+        )
     return found if isinstance(value, list | str) else value
 
 

@@ -6,7 +6,7 @@ from demo_configuration import LONG_RANGE, TRUTH, file_surface, measured_surface
 
 from icha.asperity.material import VAN_DER_WAALS_RANGE
 from icha.configuration.cases import run_cases, run_settings, solution_cases, surface_cases, surface_settings
-from icha.configuration.design import value_label
+from icha.configuration.design import sampled_parameters, value_label
 from icha.configuration.errors import ConfigurationError
 from icha.surfaces.spectrum import SelfAffineSpectrum
 from icha.surfaces.surface import Surface
@@ -153,6 +153,33 @@ def test_bodies_give_the_contact_modulus_and_the_ratio_of_a_layer(load):
     layer = material(bodies=["rigid", rubber], thickness="100 um")
     assert (layer["contact_modulus"], layer["poisson_ratio"]) == (pytest.approx(2e6 / 0.75, rel=1e-14), 0.5)
     assert material(interaction_range=None)["interaction_range"] == VAN_DER_WAALS_RANGE
+
+
+def test_the_youngs_modulus_of_a_body_can_be_given_alone_varied_and_sampled(load):
+    def materials(changes):
+        campaign = load({"materials.soft.contact_modulus": None} | changes).campaign
+        return [run_settings(campaign, case)["material"] for case in run_cases(campaign)]
+
+    alone = {"materials.soft.youngs_modulus": "2 MPa", "materials.soft.poisson_ratio": 0.4}
+    assert materials(alone)[0]["contact_modulus"] == pytest.approx(2e6 / 0.84, rel=1e-14)
+    bodies = {"materials.soft.bodies": ["rigid", {"youngs_modulus": "2 MPa", "poisson_ratio": 0.5}]}
+    single = bodies | {"studies.one.seeds": [1], "studies.one.rms_slopes": [0.5]}
+    varied = materials(single | {"studies.one.vary": {"youngs_modulus": ["3 MPa", "4 MPa"]}})
+    assert [each["contact_modulus"] for each in varied] == pytest.approx([3e6 / 0.75, 4e6 / 0.75], rel=1e-14)
+    varied = materials(single | {"studies.one.vary": {"poisson_ratio": [0.3, 0.5]}})
+    assert [each["contact_modulus"] for each in varied] == pytest.approx([2e6 / 0.91, 2e6 / 0.75], rel=1e-14)
+    sample = {"studies.one.sample": {"count": 4, "parameters": {"youngs_modulus": ["1 MPa", "3 MPa"]}}}
+    campaign = load({"materials.soft.contact_modulus": None} | single | sample).campaign
+    (unit, *_, drawn) = sampled_parameters(campaign)["one"][1]["youngs_modulus"]
+    found = [run_settings(campaign, case)["material"]["contact_modulus"] for case in run_cases(campaign)]
+    assert unit == "Pa" and found == pytest.approx([each / 0.75 for each in drawn], rel=1e-14)
+    two = single["materials.soft.bodies"][1]
+    for wrong, message in (
+        (bodies | {"materials.soft.bodies": [two, two]}, "needs `bodies` with one elastic body"),
+        ({"materials.soft.contact_modulus": "25 MPa"}, "is given beside `contact_modulus`"),
+    ):
+        with pytest.raises(ConfigurationError, match=message):
+            load({"materials.soft.contact_modulus": None} | single | sample | wrong)
 
 
 LEVELS = {"asperities": "1..4", "coarse": [1, 2, 3], "fine": [1, 2]}

@@ -19,6 +19,20 @@ def rough(seed=1, short=100e-6 / 24):
     return SelfAffineSpectrum(100e-6, 25e-6, short, 0.8).realise(grid=256, seed=seed)
 
 
+@pytest.mark.parametrize(("hurst", "of_1_e", "of_sal"), [(0.8, 4.1, 3.1), (0.5, 5.0, 3.5)])
+def test_the_correlation_length_as_messages_and_faq_relate_it_to_the_roll_off(hurst, of_1_e, of_sal):
+    surface = SelfAffineSpectrum(16.0, 1.0, 1 / 8, hurst).realise(grid=512, seed=1)
+    power = np.abs(np.fft.fft2(surface.heights)) ** 2
+    correlation = np.fft.ifft2(power).real
+    # Profiles along both axes; fixed amplitudes make the sum over all directions nearly exact.
+    along = (correlation[0] + correlation[:, 0])[:64] / (2 * correlation[0, 0])
+    lags = np.arange(64) * surface.spacing
+    for level, expected in ((np.exp(-1), of_1_e), (0.2, of_sal)):
+        first = np.argmax(along < level)
+        length = np.interp(-level, -along[first - 1 : first + 1], lags[first - 1 : first + 1])
+        assert 1.0 / length == pytest.approx(expected, rel=0.06)
+
+
 def test_moments_are_variances_of_profiles():
     surface = rough()
     q = 2 * np.pi * np.fft.fftfreq(surface.grid, surface.spacing)
