@@ -27,6 +27,13 @@ def test_matrix_of_text(tmp_path, first_axis, stored):
     assert_read(scan(tmp_path / "scan.txt", height_unit=NM, size=SIZE, first_axis=first_axis))
 
 
+def test_first_axis_exchanges_rows_and_cells(tmp_path):
+    lines = [" ".join(f"{height:.4f}" for height in row) for row in HEIGHTS.T]
+    for heading in (["# Pixel: 0.25 um"], [f"Scan size: {SIZE[1] / UM} um x {SIZE[0] / UM} um"]):
+        (tmp_path / "scan.txt").write_text("\n".join([*heading, "# Unit: nm", *lines]) + "\n")
+        assert_read(scan(tmp_path / "scan.txt", first_axis="x"))
+
+
 @pytest.mark.parametrize("separator", [" ", ","])
 def test_xyz_in_any_order(tmp_path, separator):
     order = np.random.default_rng(8).permutation(HEIGHTS.size)

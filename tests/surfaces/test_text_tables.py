@@ -138,13 +138,29 @@ def with_coordinates(along, row, column, corner):
 
 
 @pytest.mark.parametrize(("row", "column", "corner"), [(1, 0, ""), (0, 1, ""), (1, 1, ""), (1, 1, "0")])
-@pytest.mark.parametrize(("step", "write"), [(1, "{:g}"), (7.5 / 128, "{:.3f}"), (1 / 3, "{:.1f}"), (0.0586, "{:.1f}")])
-def test_numbers_and_coordinates_of_rows_and_columns_are_no_heights(tmp_path, step, write, row, column, corner):
-    along = [write.format(step * k) for k in range(GRID)]
-    prepared = read(written(tmp_path, text(with_coordinates(along, row, column, corner))))
-    assert_heights(prepared)
-    left_out = " and ".join(["row"] * row + ["column"] * column)
-    assert f"first {left_out} left out" in prepared.reading
+@pytest.mark.parametrize(
+    "write", ["{0:g}", "{1:.3f}", "{1:.1f}", "{2:.3f}"], ids=["numbers", "steps", "few digits", "unequal"]
+)
+def test_coordinates_along_an_edge_are_asked_about(tmp_path, write, row, column, corner):
+    along = [write.format(k, 7.5 / 128 * k, k**1.2) for k in range(GRID)]
+    with refused("path", r"first (row|column) of numbers, .* seem to be coordinates.*Remove the (row|column)"):
+        read(written(tmp_path, text(with_coordinates(along, row, column, corner))))
+
+
+def test_numbers_in_the_last_column_are_asked_about(tmp_path):
+    with refused("path", "last column"):
+        read(written(tmp_path, text([[*row, str(k)] for k, row in enumerate(rows())])))
+
+
+def test_heights_along_an_edge_are_no_coordinates(tmp_path):
+    """An egg box whose first row and column are zero, a facet, a saddle; and zeros below the first row."""
+    y, x = 2 * np.pi * np.mgrid[:GRID, :GRID] / GRID
+    box = 100 * np.sin(2 * x) * np.sin(2 * y)
+    first = HEIGHTS.copy()
+    first[1:3] = 0
+    for heights in (box, np.abs(x - np.pi) + np.sin(3 * y), x * y, first):
+        read_ = read(written(tmp_path, text(rows(heights, "{:.4f}".format))))
+        assert read_.surface.grid == GRID
 
 
 def test_a_corner_without_a_number_is_refused(tmp_path):
@@ -154,16 +170,24 @@ def test_a_corner_without_a_number_is_refused(tmp_path):
             read(written(tmp_path, text(with_coordinates(along, 1, 1, corner), delimiter), "scan.txt"))
 
 
-@pytest.mark.parametrize("place", [(1, 0), (0, 1)])
-def test_unequal_coordinates_are_asked_about(tmp_path, place):
-    along = [f"{k**1.2:.3f}" for k in range(GRID)]
-    with refused("path", r"seem to be coordinates; expected.*Remove the"):
-        read(written(tmp_path, text(with_coordinates(along, *place, ""))))
+@pytest.mark.parametrize("place", [0, 10, GRID - 3])
+@pytest.mark.parametrize("word", ["nan", ""])
+@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
+def test_a_row_of_missing_heights_is_a_row(tmp_path, delimiter, word, place):
+    fields = rows()
+    fields[place : place + 3] = [[word] * GRID] * 3
+    for heading in ((), ("Sample A", "Unit: nm")):
+        assert_heights(read(written(tmp_path, text(fields, delimiter, heading))), missing=3 * GRID)
 
 
-def test_numbers_in_the_last_column_are_refused(tmp_path):
-    with refused("path", "last column"):
-        read(written(tmp_path, text([[*row, str(k)] for k, row in enumerate(rows())])))
+def test_delimiters_at_the_end_of_all_lines(tmp_path):
+    fields = [[*row, ""] for row in rows()]
+    prepared = read(written(tmp_path, text(fields)))
+    assert_heights(prepared)
+    assert "',' at the end of every line left out" in prepared.reading
+    fields[3][4] = ""
+    with refused("path", "the last column may be missing heights, or no column"):
+        read(written(tmp_path, text(fields)))
 
 
 def test_several_images_in_a_text_are_refused(tmp_path):
@@ -225,11 +249,82 @@ def test_a_size_with_three_digits_behind_a_comma_is_ambiguous(tmp_path):
     assert_heights(read(path))
 
 
-@pytest.mark.parametrize("line", ["nrows 30", "ncols 12", "Lines: 30", "Columns: 25"])
+@pytest.mark.parametrize("line", ["nrows 30", "ncols 12", "Lines: 30", "Columns: 25", '"Vertical",30'])
 def test_counts_of_a_heading_are_checked(tmp_path, line):
-    with refused("path", f"24 (rows|columns) of numbers, but its heading states {line[-2:]}"):
+    count = line[-2:]
+    with refused("path", f"24 (rows|columns) of numbers, but its heading states {count} in {line!r}"):
         read(written(tmp_path, text(rows(), " ", [line])))
-    assert_heights(read(written(tmp_path, text(rows(), " ", [f"{line[:-2]}24"]))))
+    assert_heights(read(written(tmp_path, text(rows(), " ", [line.replace(count, "24"), "Samples: 4"]))))
+
+
+@pytest.mark.parametrize(
+    ("heading", "words"),
+    [
+        (["Width: 12 um", "Lines: 24"], "does not contain the size"),
+        (["Width: 12 um", "Height: 350 nm"], "12 um x 350 nm, do not fit 24 x 24 square pixels"),
+        (["Scan size: 12 um x 6 um"], "do not fit"),
+        (["Scan size: 10 um", "Pixel: 0.5 um"], "10 um, 0.5 um, do not fit"),
+        (["Pixel: 0.5"], "does not contain the size"),
+    ],
+)
+def test_a_size_that_a_heading_does_not_state_clearly_is_asked_for(tmp_path, heading, words):
+    path = written(tmp_path, text(rows(), " ", heading), "scan.txt")
+    with refused("size", words):
+        read(path, size=None)
+    assert_heights(read(path))
+
+
+def test_two_units_of_the_heights_are_asked_about(tmp_path):
+    path = written(tmp_path, text(rows(), " ", ["Z unit: nm", "Height unit: um"]), "scan.txt")
+    with refused("height_unit", "the file states nm and um"):
+        read(path, height_unit=None)
+    assert_heights(read(path))
+
+
+# Width, height, value units and lateral units as Gwyddion translates them.
+GWYDDION = {
+    "cs": ("Šířka:", "Výška:", "Jednotky hodnot:", "Jednotky rozměrů:"),
+    "de": ("Breite:", "Höhe:", "Einheiten:", "_Laterale Einheiten:"),
+    "en": ("Width:", "Height:", "Value units:", "Lateral units:"),
+    "es": ("Anchura:", "Altura:", "Unidades de valor:", "Lateral units:"),
+    "fr": ("Largeur :", "Hauteur :", "Unités :", "Unités latérales :"),
+    "it": ("Larghezza:", "Altezza:", "unità valore:", "Unità laterali:"),
+    "ja": ("幅:", "高さ:", "値の単位:", "Lateral units:"),
+    "ko": ("폭:", "높이:", "값 단위:", "Lateral units:"),
+    "ru": ("Ширина:", "Высота:", "Единицы измерения:", "Единицы горизонтальных размеров:"),
+}
+
+
+@pytest.mark.parametrize("language", GWYDDION)
+def test_headings_of_gwyddion_in_its_languages(tmp_path, language):
+    width, height, values, lateral = GWYDDION[language]
+    image = ["# Z: Z", f"# {width} 12.00 µm", f"# {height} 12000 nm", f"# {values} nm"]
+    assert_heights(read(written(tmp_path, text(rows(), "\t", image), "scan.txt"), height_unit=None, size=None))
+    places = ["# Z: Z", f"# {lateral} µm", f"# {values} nm"]
+    assert_heights(read(written(tmp_path, text(points(), "\t", places), "scan.xyz"), height_unit=None, size=None))
+
+
+@pytest.mark.parametrize("wrap", [5, 24, 31])
+def test_grids_of_esri_and_surfer_in_lines_of_any_length(tmp_path, wrap):
+    numbers = [field for row in rows() for field in row]
+    numbers[75] = "{missing}"
+    lines = [numbers[k : k + wrap] for k in range(0, GRID**2, wrap)]
+    for heading, missing in (
+        (["ncols 24", "nrows 24", "xllcorner 0", "yllcorner 0", "cellsize 0.5"], "-9999"),
+        (["NCOLS 24", "NROWS 24", "xllcenter 0", "yllcenter 0", "dx 0.5", "dy 0.5", "NODATA_value -1"], "-1"),
+        (["DSAA", "24 24", "0 11.5", "1 12.5", "-500 500"], "1.70141e+38"),
+    ):
+        content = text(lines, " ", heading).format(missing=missing)
+        path = written(tmp_path, content, "scan.grd")
+        assert_heights(read(path, size=None, lateral_unit=UM), missing=1)
+        with refused("path", "numbers in the last row|23 rows of numbers"):
+            read(written(tmp_path, content.rsplit(None, 24)[0], "scan.grd"), size=None, lateral_unit=UM)
+
+
+def test_zygo_integers_are_refused(tmp_path):
+    heading = ["Zygo ASCII Data File - Format 2", '1 7 5 0 "Thu Jan 01 2026"', "0 0 0 0 0 0", "0 0 24 24", "#"]
+    with refused("path", "Zygo file without points"):
+        read(written(tmp_path, text(rows(write="{:.0f}".format), " ", heading)))
 
 
 @pytest.mark.parametrize(
@@ -279,57 +374,34 @@ def test_what_is_given_instead_of_what_the_file_says_is_printed(tmp_path):
     assert "the size 10 um x 10 um and the unit of heights 1 um" in reading
 
 
-# --- two hundred tables, damaged at random -------------------------------------------------------------------------
-
-WRITE = ("{:.3f}".format, "{:.6e}".format, '"{:.3f}"'.format, lambda height: f"{height:.9E}".replace("E", "D"))
-WORDS = ("", "BAD", "none", "NaN", "-", "*", "#N/A", "null")
-
-
-def damaged_table(number):
-    """A table with several damages: its bytes, the number of missing points, and whether a row is broken."""
-    random = np.random.default_rng(number)
-    delimiter = random.choice([",", ";", "\t", " "])
-    write = WRITE[random.integers(4)]
-    fields = rows(write=write)
-    holes = random.choice(GRID**2, random.choice([0, 1, 20]), replace=False)
-    for hole in holes:
-        # With blanks between the numbers nothing is no field.
-        fields[hole // GRID][hole % GRID] = str(random.choice(WORDS[1:] if delimiter == " " else WORDS))
-    broken = random.random() < 0.2
-    if broken:
-        row = fields[random.integers(GRID)]
-        changes = (lambda: row.__setitem__(random.integers(GRID), "1.2.3"), row.pop, lambda: row.append("3.1"))
-        changes[random.integers(3)]()
-    heading = random.choice(["", "# remark\n", "Sample: A1\nUnit: nm\n", "x;y;z\n\n"])
-    if random.random() < 0.3:
-        fields = [[str(k), *row] for k, row in enumerate(fields)]
-    if random.random() < 0.3:
-        first = [f"{0.25 * k:g}" for k in range(GRID)]
-        fields.insert(0, ["0"] * (len(fields[-1]) > len(first) and not broken) + first)
-        if len(fields[0]) != max(map(len, fields)):
-            del fields[0]
-    ending = random.choice(["\n", "\r\n"])
-    content = heading + text(fields, delimiter)
-    content = content.replace("\n", ending).encode(random.choice(["utf-8", "utf-8-sig", "utf-16", "latin-1"]))
-    if random.random() < 0.1:
-        content = gzip.compress(content)
-    return content, len(holes), broken
+@pytest.mark.parametrize("given", [{"lateral_unit": UM, "size": None}, {}])
+def test_points_of_nan_are_missing_points_of_a_grid(tmp_path, given):
+    lines = points()
+    for k in (5, 77, 300):
+        lines[k] = ["nan"] * 3
+    lines[200][2] = "nan"
+    assert_heights(read(written(tmp_path, text(lines, " "), "scan.xyz"), **given), missing=4)
+    lines[:GRID] = [["nan"] * 3] * GRID
+    with refused("path", f"{GRID + 2} lines without coordinates, but the grid of the other lines lacks 2 points"):
+        read(written(tmp_path, text(lines, " "), "scan.xyz"), **given)
+    lines[0][2] = "3.5"
+    with refused("path", "a height without coordinates"):
+        read(written(tmp_path, text(lines, " "), "scan.xyz"), **given)
 
 
-@pytest.mark.parametrize("part", range(4))
-def test_damaged_tables_give_the_right_heights_or_the_line(tmp_path, part):
-    path = tmp_path / "scan.txt"
-    refused = 0
-    for number in range(50 * part, 50 * (part + 1)):
-        content, missing, broken = damaged_table(number)
-        path.write_bytes(content)
-        try:
-            prepared = read(path)
-        except UnfitTopography as error:
-            assert broken, f"table {number}: {error}"
-            assert "line " in str(error) and "remove" in str(error)
-            refused += 1
-            continue
-        assert not broken, f"table {number} is broken, and was read"
-        assert_heights(prepared, missing)
-    assert refused
+@pytest.mark.parametrize("titles", ["load (mN),contact radius (um),depth (nm)", "Force [N],Radius [m]"])
+def test_measurements_of_a_contact_are_no_topography(tmp_path, titles):
+    lines = [[str(k**power) for power in range(1, titles.count(",") + 2)] for k in range(1, 12)]
+    with refused("path", r"is a table of .*[Rr]adius.*belong to the section `measurements`"):
+        read(written(tmp_path, text(lines, ",", [titles])))
+
+
+@pytest.mark.parametrize("titles", ["row,col,z", "x_um,y_um,z_nm"])
+def test_titles_that_are_not_known_are_asked_about(tmp_path, titles):
+    path = written(tmp_path, text(points(), ",", [titles]))
+    with refused("columns", f"the columns are {titles.replace(',', ', ')}; expected"):
+        read(path, size=None, lateral_unit=UM)
+    assert_heights(read(path, size=None, lateral_unit=UM, columns=(1, 2, 3)))
+    path = written(tmp_path, text(points(), ",", ["x (px),y (px),z (nm)"]))
+    with refused("lateral_unit", "the unit of column x is 'px'"):
+        read(path, size=None)

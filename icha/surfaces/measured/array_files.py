@@ -24,9 +24,9 @@ from icha.surfaces.measured.settings import (
 _COPIES = 3
 # Formats without a signature: any file of a certain length fits, so the file name must have the ending of the format.
 _WITHOUT_SIGNATURE = ("hgt", "nms")
-# Formats that do not identify an instrument. SurfaceTopography reads any text with numbers as `asc`, and then drops
-# fields that are not numbers.
-_OF_ANY_TEXT = ("asc", *_WITHOUT_SIGNATURE)
+# Formats that do not identify an instrument. SurfaceTopography reads any text with numbers as `asc` or `xyz`, and then
+# drops fields that are not numbers.
+_OF_ANY_TEXT = ("asc", "xyz", "matrix", *_WITHOUT_SIGNATURE)
 _UNKNOWN = (
     "cannot be read as instrument: the file is damaged, or its format is not known here; expected another `format`, or "
     "an export of the heights as text"

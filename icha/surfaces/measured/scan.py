@@ -21,7 +21,7 @@ from icha.surfaces.measured.array_files import (
 )
 from icha.surfaces.measured.settings import LINE_SCAN, Preparation, UnfitTopography
 from icha.surfaces.measured.text_files import format_of_text, read_fourier, read_matrix, read_xyz
-from icha.surfaces.measured.text_tables import SourceFile, first_damaged_line
+from icha.surfaces.measured.text_tables import SourceFile
 
 READERS = {
     "npy": read_npy,
@@ -158,8 +158,6 @@ def _read(path, settings):
         with bounded_memory():
             if name == "text":
                 name = format_of_text(file)
-                if name == "instrument" and file.instrument is None and (damage := first_damaged_line(path)):
-                    raise damage
             found = READERS[name](file, settings)
     except UnfitTopography:
         raise

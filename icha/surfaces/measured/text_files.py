@@ -1,10 +1,9 @@
 """Read text files with a row of heights, a point x y z, or a wave in every line; interpret the heading of the file."""
 
-import itertools
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.fft
@@ -22,35 +21,55 @@ from icha.surfaces.measured.settings import (
     metres_of,
     put_y_first,
 )
-from icha.surfaces.measured.text_lines import AMBIGUOUS_COMMA, strip_remark
-from icha.surfaces.measured.text_tables import SourceFile, drop_coordinates
+from icha.surfaces.measured.text_tables import AMBIGUOUS_COMMA, Layout, SourceFile, refuse_coordinates, strip_remark
 
 # Fewest columns of a table with a row of heights in every line.
 _FEWEST_COLUMNS = 8
 # Title of a column: its name and, in brackets, its unit.
-_TITLE = re.compile(r"([a-z]+)\s*(?:[\[(]\s*([^\])]+?)\s*[\])])?", re.IGNORECASE)
+_TITLE = re.compile(r"([a-z]+)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?", re.IGNORECASE)
 _NAMES_OF_Z = ("z", "h", "height")
+# Words in the titles of tables that are no topographies, such as measurements of contact.
+_QUANTITIES = re.compile(r"load|force|radius|area|pressure|displacement|indentation|approach|time", re.IGNORECASE)
 # Relative error of numbers with seven digits, or of single precision.
 _FEW_DIGITS = 1e-6
+# A size in a heading of no known format counts only if the pixels are square up to this relative difference.
+_SQUARE = 1e-2
+# Surfer writes this number for a missing height.
+_SURFER_MISSING = 1.70141e38
 # Bytes per node for the spectrum, the conjugate spectrum, their difference, the heights and the masks of waves.
 _BYTES_OF_NODE = 64
 # Opposite waves count as conjugate if the error, divided by the largest amplitude, is at most this value.
 _CONJUGATE = 1e-4
-# Text images from Gwyddion have a line with the width of the image, and then a line with the height. The pattern
-# contains the first word of the line with the width, in the languages of Gwyddion.
-_WIDTH = re.compile(r"^#?\s*(Width|Šířka|Breite|Anchura|Largeur|Larghezza|幅|폭|Largura|Ширина)\s*[:：]\s*(.*)$")
+# Labels that Gwyddion writes in the languages of its menus (msgid Width, Height, Value units and Lateral units in the
+# files po/*.po of Gwyddion).
+_GWYDDION = {
+    "width": "Width|Šířka|Breite|Anchura|Largeur|Larghezza|幅|폭|Largura|Ширина",
+    "height": "Height|Výška|Höhe|Altura|Hauteur|Altezza|高さ|높이|Высота",
+    "value units": "Value units|Jednotky hodnot|Einheiten|Unités|unità valore|値の単位|값 단위|Unidades de valor"
+    "|Единицы измерения",
+    "lateral units": "Lateral units|Jednotky rozměrů|_?Laterale Einheiten|Unités latérales|Unità laterali"
+    "|Единицы горизонтальных размеров",
+}
+_LABELS = {label: re.compile(rf"#?\s*({words})\s*[:：]\s*(.*)", re.IGNORECASE) for label, words in _GWYDDION.items()}
+# Words in the headings of texts that SurfaceTopography reads: Wyko, SPIP, Attocube, Nova, and interferometers.
+_INSTRUMENT = re.compile(
+    r"Wyko ASCII|File Format\s*=\s*ASCII|x-pixels|x-length|^\s*Scale X\s*=|height\s+conversion\s+factor",
+    re.IGNORECASE | re.MULTILINE,
+)
 _NUMBER = r"([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)"
 # One length or two, such as 12 µm x 12 µm.
 _LENGTHS = re.compile(rf"{_NUMBER}\s*(\S+?)?(?:\s*[x×*]\s*{_NUMBER}\s*(\S+)?)?$")
 # A line of the heading: a name, then a colon, an equals sign, a delimiter or blanks, then a value.
-_ENTRY = re.compile(r"^[#%/\s\"']*([A-Za-z][A-Za-z _./()-]*?)\s*(?:[:=,;\t]\s*|\s+(?=[-+]?\d))(.+?)[\s\"']*$")
-# Names of entries in a heading, in small letters and without punctuation.
+_ENTRY = re.compile(r"^[#%/\s']*([A-Za-z][A-Za-z _./()-]*?)\s*(?:[:=,;\t]\s*|\s+(?=[-+]?\d))(.+?)[\s',;]*$")
+# Names of entries in a heading, in small letters and without punctuation; the last ones are Keyence's.
 _SIZES = ("size", "scan size", "scan range", "scan area", "field of view")
-_PIXELS = ("pixel", "pixel size", "pixel spacing", "spacing", "point spacing", "cellsize", "cell size")
-_UNITS = ("unit", "units", "z unit", "z units", "value unit", "value units", "height unit", "height units", "data unit")
+_PIXELS = ("pixel", "pixel size", "pixel spacing", "point spacing", "spacing", "cell size", "cellsize")
+_PIXELS += ("xy calibration", "xy justierung")
+_HEIGHT_UNITS = ("z unit", "z units", "value unit", "value units", "height unit", "height units", "data unit")
+_UNITS = ("unit", "units", "einheit")
 _COUNTS = {
-    "rows": ("nrows", "rows", "lines", "number of rows", "number of lines"),
-    "columns": ("ncols", "cols", "columns", "samples", "number of columns"),
+    "rows": ("nrows", "rows", "lines", "number of rows", "number of lines", "vertical", "vertikal"),
+    "columns": ("ncols", "cols", "columns", "number of columns", "horizontal", "horizont"),
 }
 _MISSING = ("nodata value", "nodata", "no data value", "missing value", "bad value", "missing data value")
 # Number for a missing height in ESRI grids, if the heading does not define another number.
@@ -64,46 +83,50 @@ class _Heading:
     Attributes
     ----------
     height_unit, lateral_unit : units of heights and of coordinates, m.
-    size : sides (x, y) of the scan, m.
-    coordinates : sides (x, y) of the scan in an unknown unit.
+    size : sides (along the rows, along the columns) of the table, m.
+    coordinates : sides of the table in an unknown unit.
     missing : numbers that mark a missing height.
     """
 
-    height_unit: float | None
-    lateral_unit: float | None
-    size: tuple[float, float] | None
-    coordinates: tuple[float, float] | None
-    missing: tuple[float, ...]
+    height_unit: float | None = None
+    lateral_unit: float | None = None
+    size: tuple[float, float] | None = None
+    coordinates: tuple[float, float] | None = None
+    missing: tuple[float, ...] = ()
 
 
 def format_of_text(file: SourceFile) -> str:
     """Find the format of a text file from its columns; "instrument" if it has no numbers or is from an instrument."""
     layout = file.layout
-    if layout is not None and _titles(layout):
-        return "xyz"
-    # Headings from instruments contain lines that are not remarks.
-    if layout is None or (any(map(strip_remark, layout.heading)) and is_instrument_text(file)):
+    if layout is None:
         return "instrument"
-    return "xyz" if 3 <= layout.columns < _FEWEST_COLUMNS and not _image_sides(layout.heading) else "matrix"
+    if _titles(layout):
+        return "xyz"
+    _refuse_measurements(layout)
+    # Headings from instruments contain lines that are not remarks; the first lines here are those of line scans.
+    if layout.heading[:1] and layout.heading[0].startswith(("X;Y;valid", "Scan Parameters")):
+        return "instrument"
+    if any(map(strip_remark, layout.heading)) and is_instrument_text(file):
+        return "instrument"
+    return "xyz" if 3 <= layout.columns < _FEWEST_COLUMNS and not _is_image(layout.heading) else "matrix"
 
 
 def read_matrix(file: SourceFile, settings: Preparation) -> FileContent:
     """Read a text file with a row of heights in every line; units, size and missing heights come from its heading."""
-    values, layout = file.values, file.table_layout
+    heights, lines = file.values, file.table_layout.heading
+    if lines and lines[0].startswith("Zygo "):
+        raise UnfitTopography("path", "is a Zygo file without points x y z; expected another export, such as XYZ")
     file.refuse_blocks()
-    heights, steps, remark = drop_coordinates(values)
-    _check_counts(layout.heading, (values.shape, heights.shape))
-    if layout.heading and not _image_sides(layout.heading) and (known := _as_instrument_file(file, settings)):
+    if _INSTRUMENT.search("\n".join(lines)) and (known := _as_instrument_file(file, settings)):
         return known
-    rows, columns = heights.shape
-    heading = _read_heading(layout.heading, heights.shape, layout.notation.decimal_comma, settings)
-    return FileContent(
-        put_y_first(_mark_missing(heights, heading), settings),
-        heading.height_unit,
-        heading.size,
-        heading.coordinates or (steps and (columns * steps[0], rows * steps[1])),
-        remark=remark,
-    )
+    if not (_counts_agree(lines, heights.shape) or _is_image(lines)):
+        refuse_coordinates(heights)
+    heading = _read_heading(file.table_layout, heights.shape, settings)
+    heights = _mark_missing(heights, heading)
+    size, coordinates, remark = heading.size, heading.coordinates, file.remark
+    if settings.first_axis == "x":
+        size, coordinates = size and size[::-1], coordinates and coordinates[::-1]
+    return FileContent(put_y_first(heights, settings), heading.height_unit, size, coordinates, remark=remark)
 
 
 def _as_instrument_file(file, settings):
@@ -123,8 +146,12 @@ def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
     """Read a text file with a point x y z in every line; points may be in any order or missing."""
     layout = file.table_layout
     titles = _titles(layout)
-    columns = _find_columns(file.values.shape[1], settings, [name for name, _ in titles])
+    columns = _find_columns(file.values.shape[1], settings, layout, [name for name, _ in titles])
     points = file.values[:, [column - 1 for column in columns]]
+    placed = np.isfinite(points[:, :2]).all(axis=1)
+    if np.isfinite(points[~placed, 2]).any():
+        raise UnfitTopography("path", "has a height without coordinates; expected x, y and z in every line")
+    without_place, points = np.count_nonzero(~placed), points[placed]
     if len(points) > 1 and any(np.ptp(points[:, axis]) == 0 for axis in (0, 1)):
         raise UnfitTopography("path", LINE_SCAN.format(len(points)))
     scattered = ""
@@ -141,16 +168,28 @@ def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
     if len(repeated):
         x, y = points[order[repeated[0]], :2]
         raise UnfitTopography("path", f"contains the point x = {x:g}, y = {y:g} twice; expected every point once")
+    if without_place > nx * ny - len(points) and not scattered:
+        raise UnfitTopography(
+            "path",
+            f"has {without_place} lines without coordinates, but the grid of the other lines lacks "
+            f"{nx * ny - len(points)} points, so the edge of the scan is not known. Remove the lines, or add x and y",
+        )
     require_room(2 * 8 * nx * ny)
-    heading = _read_heading(layout.heading, points.shape, layout.notation.decimal_comma, settings)
+    heading = _read_zygo(layout.heading) or _read_heading(layout, points.shape, settings)
     heights = np.full(nx * ny, np.nan)
     heights[node] = _mark_missing(points[:, 2], heading)
-    units = [titles[column - 1][1] if titles else None for column in columns]
-    x_unit, y_unit = units[0] or heading.lateral_unit, units[1] or heading.lateral_unit
+    units = [titles[column - 1][1] if titles else "" for column in columns]
+    for axis, unit in zip("xy", units[:2], strict=True):
+        if unit and metres_of(unit) is None and settings.lateral_unit is None and settings.size is None:
+            raise UnfitTopography(
+                "lateral_unit", f"is missing, and the unit of column {axis} is {unit!r}; expected a length"
+            )
+    x_unit, y_unit, z_unit = (metres_of(unit) for unit in units)
+    x_unit, y_unit = x_unit or heading.lateral_unit, y_unit or heading.lateral_unit
     remark = "columns x {}, y {}, z {} by their names".format(*columns)
     return FileContent(
         heights.reshape(ny, nx),
-        units[2] or heading.height_unit,
+        z_unit or heading.height_unit,
         (nx * dx * x_unit, ny * dy * y_unit) if x_unit and y_unit and settings.lateral_unit is None else None,
         (nx * dx, ny * dy),
         remark="; ".join(filter(None, (remark if titles and columns != sorted(columns) else "", scattered))),
@@ -178,26 +217,37 @@ def _interpolate(points):
     return np.column_stack([x.ravel(), y.ravel(), z.ravel()]), remark
 
 
-def _titles(layout):
-    """Read the titles of the columns from the last line above the numbers.
-
-    Returns
-    -------
-    Name and unit (m, or None) of every column. The list is empty unless x, y and z each occur exactly once.
-    """
+def _words_above(layout):
+    """Return the words in the last line above the numbers, one for each column; an empty list without titles."""
     if not layout.heading:
         return []
-    delimiters = r"[,;\t]" if layout.notation.delimiter else r"\s+(?![\[(])"
-    fields = re.split(delimiters, layout.heading[-1].strip(' \t\r\n#%"'))
-    found = [_TITLE.fullmatch(field.strip(" \"'")) for field in fields]
+    delimiters = r"[,;\t]" if layout.delimiter != " " else r"[,;]\s*|\s+(?![\[(])"
+    words = [word.strip(" \"'") for word in re.split(delimiters, layout.heading[-1].strip(' \t\r\n,;#%"'))]
+    return words if len(words) == layout.columns and not re.search("[:=]", layout.heading[-1]) else []
+
+
+def _titles(layout):
+    """Return name and unit (as text) of every column; an empty list unless x, y and z each occur exactly once."""
+    found = [_TITLE.fullmatch(word) for word in _words_above(layout)]
     names = [match[1].lower() if match else "" for match in found]
     names = ["z" if name in _NAMES_OF_Z else name for name in names]
-    if len(names) != layout.columns or any(names.count(axis) != 1 for axis in "xyz"):
+    if any(names.count(axis) != 1 for axis in "xyz"):
         return []
-    return [(name, metres_of(match[2] or "") if match else None) for name, match in zip(names, found, strict=True)]
+    return [(name, (match[2] or "") if match else "") for name, match in zip(names, found, strict=True)]
 
 
-def _find_columns(count, settings, names):
+def _refuse_measurements(layout):
+    """Raise UnfitTopography if the titles of the columns are quantities of a contact, such as load and radius."""
+    words = _words_above(layout)
+    if sum(bool(_QUANTITIES.search(word)) for word in words) > 1:
+        raise UnfitTopography(
+            "path",
+            f"is a table of {', '.join(words)[:80]}; expected heights over x and y. Measured loads and areas belong to "
+            "the section `measurements`",
+        )
+
+
+def _find_columns(count, settings, layout, names):
     """Return the numbers (from 1) of the columns x, y and z in a table with `count` columns."""
     if settings.columns is not None:
         if max(settings.columns) > count:
@@ -205,11 +255,13 @@ def _find_columns(count, settings, names):
         return list(settings.columns)
     if names:
         return [names.index(axis) + 1 for axis in "xyz"]
-    if count != 3:
+    _refuse_measurements(layout)
+    words = _words_above(layout)
+    if count != 3 or words:
         waves = ". For wave vectors and amplitudes use `format: fourier`" if count == 4 else ""
+        lines = f"the columns are {', '.join(words)[:80]}" if words else f"lines have {count} numbers"
         raise UnfitTopography(
-            "columns",
-            f"is missing, and lines have {count} numbers; expected the columns x, y and z, such as [1, 2, 3]{waves}",
+            "columns", f"is missing, and {lines}; expected the columns x, y and z, such as [1, 2, 3]{waves}"
         )
     return [1, 2, 3]
 
@@ -221,86 +273,129 @@ def _mark_missing(heights, heading):
     return heights
 
 
-def _read_heading(lines: Sequence[str], shape: tuple[int, int], decimal_comma: bool, settings: Preparation) -> _Heading:
+def _read_zygo(lines: Sequence[str]) -> _Heading | None:
+    """Read the heading of a Zygo text of points (column, row, height in um); None for other files.
+
+    Line 8 of the heading contains the size of a pixel in m (0 if it is not known).
+    """
+    if not (lines and lines[0].startswith("Zygo ")):
+        return None
+    return _Heading(1e-6, float(lines[7].split()[6]) or None)
+
+
+def _read_surfer(lines, shape):
+    """Read the heading of a Surfer grid (DSAA): numbers of columns and rows, and ranges of x and y."""
+    (columns, rows), *ranges = ([float(number) for number in line.split()[:2]] for line in lines[1:4])
+    _require_counts({"columns": (int(columns), lines[1]), "rows": (int(rows), lines[1])}, shape)
+    sides = [abs(high - low) * count / (count - 1) for (low, high), count in zip(ranges, (columns, rows), strict=True)]
+    return _Heading(coordinates=tuple(sides), missing=(_SURFER_MISSING,))
+
+
+def _read_heading(layout: Layout, shape: tuple[int, int], settings: Preparation) -> _Heading:
     """Read units, size and missing heights from the heading of a table with the given shape (rows, columns).
 
-    Raises UnfitTopography if the size in the heading has an ambiguous comma and the settings have no size.
+    Raises UnfitTopography if entries of the heading contradict each other, or the size has an ambiguous comma, and the
+    settings do not contain the value.
     """
-    entries, sides = _entries(lines), _image_sides(lines)
-    if {"ncols", "nrows", "cellsize"} <= entries.keys():
-        entries.setdefault(_MISSING[0], _ESRI_MISSING)
+    lines = layout.heading
+    if lines and lines[0].strip() == "DSAA":
+        return _read_surfer(lines, shape)
+    entries = _entries(lines)
 
     def values(names):
-        return [entries[name] for name in names if name in entries]
+        return [entries[name][0] for name in names if name in entries]
 
-    sizes, pixels = values(_SIZES), values(_PIXELS)
-    commas = [text for text in (*sizes, *pixels, *sides) if AMBIGUOUS_COMMA.match(text)]
-    if commas and not decimal_comma and settings.size is None:
-        raise UnfitTopography(
-            "size",
-            f"is {commas[0]!r} in the file; the comma may be decimal or separate thousands. Give the size in this key",
-        )
-    size, coordinates = _size([*([" x ".join(sides)] if sides else []), *sizes], pixels, shape)
-    return _Heading(
-        height_unit=next(filter(None, map(metres_of, values(_UNITS))), None),
-        lateral_unit=metres_of(entries.get("lateral units", "")),
-        size=size,
-        coordinates=coordinates,
+    rows, columns = shape
+    esri = {"ncols", "nrows"} <= entries.keys()
+    if esri:
+        entries.setdefault(_MISSING[0], (_ESRI_MISSING, ""))
+    heading = _Heading(
+        height_unit=_agreed("height_unit", values(_HEIGHT_UNITS) or values(_UNITS), settings.height_unit),
+        lateral_unit=next(map(metres_of, values(["lateral units"])), None),
         missing=tuple(_number(found[1]) for found in map(_LENGTHS.match, values(_MISSING)) if found),
     )
+    texts = [(text, (1, 1)) for text in values(_SIZES)] + [(text, (columns, rows)) for text in values(_PIXELS)]
+    found = [(text, x * nx, y * ny) for text, (nx, ny) in texts for x, y in _lengths(text)]
+    if not found and esri and (steps := re.fullmatch(rf"{_NUMBER}(?: x {_NUMBER})?", texts[0][0] if texts else "")):
+        x, y = _number(steps[1]), _number(steps[2] or steps[1])
+        return replace(heading, coordinates=(x * columns, y * rows))
+    pixels = [(x / columns, y / rows) for _, x, y in found]
+    stated = ", ".join(text for text, _, _ in found)
+    problem = ""
+    if layout.decimal != "," and any(AMBIGUOUS_COMMA.match(text) for text, _, _ in found):
+        problem = f"is {stated!r} in the file; the comma may be decimal or separate thousands"
+    elif not (esri or _is_image(lines) or np.allclose(pixels, pixels[0][0] if pixels else 0, rtol=_SQUARE, atol=0)):
+        problem = f"is missing, and the lengths in the heading, {stated}, do not fit {columns} x {rows} square pixels"
+    if problem and settings.size is None:
+        raise UnfitTopography("size", f"{problem}. Give the size in this key")
+    return replace(heading, size=found[0][1:]) if found and not problem else heading
 
 
-def _image_sides(lines: Sequence[str]) -> list[str]:
-    """Return width and height, as text, from the heading of an image that Gwyddion exported; else an empty list."""
-    for line, following in itertools.pairwise(lines):
-        if (found := _WIDTH.match(line)) and ":" in following:
-            return [found[2].strip(), following.partition(":")[2].strip()]
-    return []
+def _agreed(key, texts, given):
+    """Return the unit of length that all texts name; None without a unit."""
+    units = sorted({unit for unit in map(metres_of, texts) if unit})
+    if len(units) > 1 and given is None:
+        raise UnfitTopography(key, f"is missing, and the file states {' and '.join(texts)}; expected one unit")
+    return units[0] if units else None
 
 
-def _check_counts(lines: Sequence[str], shapes: Sequence[tuple[int, int]]) -> None:
-    """Raise UnfitTopography unless one of the shapes has the rows and columns that the heading states."""
+def _is_image(lines: Sequence[str]) -> bool:
+    """Return whether a heading is that of an image which Gwyddion exported: width, height and unit in remarks."""
+    labels = [label for line in lines if line.startswith("#") for label, regex in _LABELS.items() if regex.match(line)]
+    return labels == ["width", "height", "value units"]
+
+
+def _counts_agree(lines: Sequence[str], shape: tuple[int, int]) -> bool:
+    """Return whether the heading states the rows and columns of a table; raise UnfitTopography if it states others."""
     entries = _entries(lines)
-    for axis, (what, names) in enumerate(_COUNTS.items()):
-        counts = [int(entries[name]) for name in names if entries.get(name, "").isdecimal()]
-        if counts and counts[0] not in [shape[axis] for shape in shapes]:
+    counts = {}
+    for axis, names in _COUNTS.items():
+        for name in names:
+            if name in entries and entries[name][0].isdecimal():
+                counts.setdefault(axis, (int(entries[name][0]), entries[name][1]))
+    _require_counts(counts, shape)
+    return len(counts) == 2
+
+
+def _require_counts(counts, shape):
+    """Raise UnfitTopography unless a table has the `counts` of rows and columns, which stand in the given lines."""
+    for axis, count in zip(("rows", "columns"), shape, strict=True):
+        stated, line = counts.get(axis, (count, ""))
+        if stated != count:
             raise UnfitTopography(
                 "path",
-                f"has {shapes[-1][axis]} {what} of numbers, but its heading states {counts[0]}; expected a whole "
-                "table. Export the table again, or correct the heading",
+                f"has {count} {axis} of numbers, but its heading states {stated} in {line.strip()[:40]!r}; expected a "
+                "whole table. Export the table again, or correct or remove this line",
             )
 
 
 def _entries(lines):
-    """Return the names (in small letters) and the values that a heading contains."""
-    entries = {}
+    """Return the values, and the lines, of the names (in small letters) that a heading contains."""
+    entries, previous = {}, ""
     for line in lines:
-        if found := _ENTRY.match(line):
-            entries.setdefault(re.sub(r"[\s_.-]+", " ", found[1].lower()).strip(), found[2].strip())
+        label = next(((label, match[2]) for label, regex in _LABELS.items() if (match := regex.match(line))), ("", ""))
+        if label[0]:
+            name, value = label
+        elif found := _ENTRY.match(line.replace('"', "")):
+            name = re.sub(r"[\s_.-]+", " ", found[1].lower()).strip()
+            # A delimiter may stand between a number and its unit.
+            value = re.sub(r"(?<=\d)\s*[,;\t]\s*(?=[^\W\d])", " ", found[2])
+        else:
+            continue
+        # The height of an image follows its width; elsewhere it may be a height of the surface.
+        for first, second, both in (("width", "height", "size"), ("dx", "dy", "pixel")):
+            if (previous, name) == (first, second):
+                entries.setdefault(both, (f"{entries[first][0]} x {value.strip()}", line))
+        entries.setdefault(name, (value.strip(), line))
+        previous = name
     return entries
 
 
-def _size(sizes, pixels, shape):
-    """Return the sides (x, y) in m, and the sides in an unknown unit; unavailable sides are None."""
-    rows, columns = shape
-    for texts, (nx, ny) in ((sizes, (1, 1)), (pixels, (columns, rows))):
-        for x, y, in_metres in filter(None, map(_lengths, texts)):
-            if in_metres:
-                return (x * nx, y * ny), None
-            if texts is pixels:
-                return None, (x * nx, y * ny)
-    return None, None
-
-
 def _lengths(text):
-    """Return lengths x and y from a text, and True if they are in m, else False; None if the text has no lengths."""
-    if not (found := _LENGTHS.match(text)):
-        return None
-    x, y, units = _number(found[1]), _number(found[3] or found[1]), (found[2] or found[4], found[4] or found[2])
-    if units == (None, None):
-        return x, y, False
-    x_unit, y_unit = map(metres_of, units)
-    return (x * x_unit, y * y_unit, True) if x_unit and y_unit else None
+    """Return a list of the lengths x and y (m) in a text; an empty list if the text has no lengths with units."""
+    found = _LENGTHS.match(text)
+    x_unit, y_unit = map(metres_of, (found[2] or found[4] or "", found[4] or found[2] or "")) if found else (None, None)
+    return [(_number(found[1]) * x_unit, _number(found[3] or found[1]) * y_unit)] if x_unit and y_unit else []
 
 
 def _number(text):

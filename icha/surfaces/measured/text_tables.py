@@ -1,54 +1,73 @@
-"""Read tables of numbers from text files: first line of numbers, notation, values, rows of coordinates."""
+"""Read tables of numbers from text files: encoding, heading, delimiter, decimal sign, and numbers (with pandas)."""
 
-from dataclasses import dataclass, replace
+import csv
+import gzip
+import io
+import itertools
+import re
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 
 from icha.surfaces.measured.array_files import open_instrument
 from icha.surfaces.measured.settings import UnfitTopography
-from icha.surfaces.measured.text_lines import (
-    AMBIGUOUS_COMMA,
-    LIKE_A_NUMBER,
-    Notation,
-    are_decimal_between_blanks,
-    are_halves_of_decimals,
-    has_decimal_commas,
-    open_text,
-    strip_remark,
-)
 
+# Words that mark a missing height, and words that are written as "nan" before pandas reads the numbers: nan of Windows
+# and C, and the stars that Fortran writes for numbers that are too wide.
+_WORDS = (
+    "- -- --- ? nan -nan +nan na n/a #n/a #na bad none null nil nodata no_data missing masked invalid void undefined "
+    "undef #value! #num! #div/0! #null! #ref!"
+).split()
+_MISSING = frozenset(["", *_WORDS, *map(str.upper, _WORDS), *map(str.capitalize, _WORDS), "NaN", "-NaN", "NoData"])
+_NAN = re.compile(r"[-+]?1\.#(ind|qnan|snan)\d*|[-+]?nan\([^)]*\)|\bno data\b|\*+", re.IGNORECASE)
+# A remark begins with #. But Windows writes nan as 1.#IND and 1.#QNAN, and Excel writes errors such as #N/A.
+_REMARK = re.compile(r"(?<!1\.)#(?!N/A|NA\b|VALUE!|NUM!|DIV/0!|NULL!|REF!)", re.IGNORECASE)
+# The exponent of a number in double precision, as Fortran writes it, such as 1.5D-3.
+_FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[-+]?\d)")
+_NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)(e[-+]?\d+)?|[-+]?inf(inity)?", re.IGNORECASE)
+# A number with three digits after a comma. The comma may be a decimal sign, or it may separate thousands.
+AMBIGUOUS_COMMA = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}(?!\d)")
+_DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+([eE][-+]?\d+)?")
+# A number, with any separator of thousands.
+_LIKE_A_NUMBER = re.compile(r"[-+]?\d[\d.,' ]*")
 # The first line of numbers must lie within the first `_BEGINNING` characters and `_LONGEST_HEADING` lines.
 _BEGINNING, _LONGEST_HEADING = 2**20, 1000
 # A line is a damaged row, not titles, if it has at least this number of fields, and at least half resemble numbers.
 _FEWEST_FIELDS = 8
-# Steps count as equal if their relative difference is at most this value, or if rounding explains the difference.
-_EQUAL_STEPS = 1e-2
-# Smallest range of coordinates, in units of the last digit.
-_FEWEST_UNITS = 4
-# Limits in `_resembles` for the first three lines of a table. Lines 1 and 2 differ by at most `_DIFFERENCE` times the
-# difference of lines 2 and 3. In addition, at least the fraction `_SAME_SIGN` of the steps has the same sign in lines 1
-# and 2, or lines 2 and 3 differ by at most `_SMOOTH` times their heights.
-_DIFFERENCE, _SAME_SIGN, _SMOOTH = 3, 0.8, 0.2
+# Lines that pandas reads at a time; this bounds the memory for text.
+_BATCH = 2**13
 # Fewest numbers in a row or column of coordinates.
 _FEWEST_COORDINATES = 8
+# Steps from number to number count as similar if the largest one is at most this multiple of the smallest one that is
+# not zero: equal steps that are rounded to few digits.
+_SIMILAR_STEPS = 2.01
 
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """Heading, notation and number of columns of a text file with a table.
+    """Heading and notation of a text file with a table.
 
     Attributes
     ----------
     heading : lines above the numbers, including remarks.
-    notation : delimiter and decimal sign.
-    columns : number of columns, counted in the first line of numbers.
+    delimiter : tab, semicolon, comma or blank.
+    decimal : decimal sign, a point or a comma.
+    fields : number of fields of each row, including an empty field after a delimiter at the end.
+    columns : number of columns, without an empty field at the end.
+    wrapped : True if a row continues on the next lines, as the heading of a known format states.
     """
 
     heading: tuple[str, ...]
-    notation: Notation
+    delimiter: str
+    decimal: str
+    fields: int
     columns: int
+    wrapped: bool
 
 
 @dataclass(eq=False)
@@ -59,12 +78,12 @@ class SourceFile:
 
     @cached_property
     def layout(self) -> Layout | None:
-        """Heading, notation and number of columns of the file; None if the file is not a text with numbers."""
-        return _find_layout(self.path)
+        """Heading and notation of the file; None if the file is not a text with numbers."""
+        return _find_layout(first_lines(self.path))
 
     @property
     def table_layout(self) -> Layout:
-        """Heading, notation and number of columns; raises UnfitTopography if the file has no numbers."""
+        """Heading and notation; raises UnfitTopography if the file has no numbers."""
         if self.layout is None:
             raise UnfitTopography(
                 "path",
@@ -81,42 +100,73 @@ class SourceFile:
         """
         return self._table[0]
 
+    @property
+    def remark(self) -> str:
+        """Remark on an empty last column that was left out."""
+        return self._table[2]
+
     @cached_property
     def _table(self):
-        """Numbers in the file, array of shape (rows, columns), and the line number (from 1) of each row."""
-        notation, columns = self.table_layout.notation, self.table_layout.columns
-        rows, lines = [], []
-        with open_text(self.path) as file:
-            for line, text in enumerate(map(strip_remark, file), 1):
-                if not text or line <= len(self.table_layout.heading):
-                    continue
-                row = notation.numbers(text)
-                if None in row:
-                    raise _not_a_number(notation.fields(text), row.index(None), line)
-                rows.append(np.array(row))
-                lines.append(line)
-        usual = int(np.bincount([len(row) for row in rows]).argmax())
-        # A delimiter after the last number of every row does not add a column.
-        if usual == columns + 1 and all(np.isnan(row[-1]) for row in rows if len(row) == usual):
-            rows = [row[:columns] if len(row) == usual else row for row in rows]
-            usual = columns
-        for line, row in zip(lines, rows, strict=True):
-            if len(row) != usual:
+        """Numbers in the file, array of shape (rows, columns), the line number (from 1) of each row, and a remark."""
+        layout, end = self.table_layout, self.table_layout.delimiter
+        values, numbers, ends, gaps = [], [], end != " ", False
+        rows = self._rows()
+        while batch := list(itertools.islice(rows, _BATCH)):
+            values.append(_read_numbers(batch, layout))
+            numbers.append(np.array([number for number, _ in batch]))
+            ends = ends and all(text.endswith(end) for _, text in batch)
+            gaps = gaps or any(text.startswith(end) or end * 2 in text for _, text in batch)
+        if ends and gaps:
+            raise UnfitTopography(
+                "path",
+                f"has {end!r} at the end of every line, and empty fields; the last column may be missing heights, or "
+                "no column. Remove the delimiters at the ends, or write nan for missing heights",
+            )
+        remark = f"{end!r} at the end of every line left out" if ends else ""
+        return np.concatenate(values)[:, : layout.fields - ends], np.concatenate(numbers), remark
+
+    def _rows(self) -> Iterator[tuple[int, str]]:
+        """Yield the line number and the text of each row; raise UnfitTopography if rows have different lengths."""
+        layout, rows = self.table_layout, self._lines()
+        if layout.wrapped:
+            numbers = ((line, field) for line, text in rows for field in text.split())
+            while row := list(itertools.islice(numbers, layout.fields)):
+                if len(row) < layout.fields:
+                    raise UnfitTopography(
+                        "path",
+                        f"has {len(row)} numbers in the last row, but its heading states {layout.fields}; expected a "
+                        "whole table. Export the table again",
+                    )
+                yield row[0][0], " ".join(field for _, field in row)
+            return
+        for line, text in rows:
+            count = _count_fields(text, layout.delimiter)
+            if count != layout.fields:
                 raise UnfitTopography(
                     "path",
-                    f"has {len(row)} numbers in line {line} but {usual} in most lines; expected rows of one "
+                    f"has {count} numbers in line {line} but {layout.fields} in most lines; expected rows of one "
                     "length. Complete or remove the line; missing heights may be NaN",
                 )
-        return np.array(rows), np.array(lines)
+            yield line, text
+
+    def _lines(self):
+        """Yield the line number and the text of each line of numbers."""
+        layout = self.table_layout
+        with open_text(self.path) as file:
+            for line, text in enumerate(itertools.islice(file, len(layout.heading), None), len(layout.heading) + 1):
+                text = _clean(text, layout.delimiter)
+                # A line of tabs is a row of missing heights if it has as many tabs as the other rows.
+                if text and (not text.isspace() or _count_fields(text, layout.delimiter) == layout.fields):
+                    yield line, text
 
     def refuse_blocks(self) -> None:
         """Raise UnfitTopography if empty lines or remarks divide the rows into blocks, as in files with several images.
 
         A file with empty lines or remarks between all rows is accepted.
         """
-        values, lines = self._table
+        values, lines, _ = self._table
         begins = np.flatnonzero(np.diff(lines) > 1) + 1
-        if len(begins) and min(np.diff([0, *begins, len(values)])) > 1:
+        if not self.table_layout.wrapped and len(begins) and min(np.diff([0, *begins, len(values)])) > 1:
             raise UnfitTopography(
                 "path",
                 f"has {len(begins) + 1} blocks of rows, the second from line {lines[begins[0]]}; expected one "
@@ -130,69 +180,204 @@ class SourceFile:
         return open_instrument(self.path)
 
 
-def _not_a_number(fields, index, line):
+def open_text(path: Path) -> TextIO:
+    """Open a text file with the right encoding; the file may be compressed by gzip."""
+    with path.open("rb") as file:
+        compressed = file.read(2) == b"\x1f\x8b"
+    opener = gzip.open if compressed else open
+    with opener(path, "rb") as file:
+        start = file.read(2**12)
+    return opener(path, "rt", encoding=_guess_encoding(start), errors="replace")
+
+
+def _guess_encoding(start: bytes) -> str:
+    """Guess the encoding: UTF-16 if the text begins with its byte order mark, else UTF-8, else Windows-1252."""
+    if start.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return "utf-16"
+    try:
+        # The last line is left out, because `start` may end within a character.
+        start[: start.rfind(b"\n") + 1].decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return "cp1252"
+    return "utf-8-sig"
+
+
+def first_lines(path: Path) -> list[str]:
+    """Read the lines at the beginning of a text file; return an empty list if the file is not text."""
+    with open_text(path) as file:
+        start = file.read(_BEGINNING)
+    return [] if "\0" in start else start.split("\n")[:_LONGEST_HEADING]
+
+
+def _clean(line: str, delimiter: str = " ") -> str:
+    """Return a line without remark (#) and outer blanks, with numbers and words for missing heights as pandas reads.
+
+    Tabs remain at the ends, because they may separate fields.
+    """
+    text = (_REMARK.split(line, maxsplit=1)[0] if "#" in line else line).strip(" \r\n\x1a")
+    text = _FORTRAN.sub("e", _NAN.sub("nan", text.replace("−", "-")))
+    return re.sub(f" *{delimiter} *", delimiter, text) if delimiter != " " and " " in text else text
+
+
+def strip_remark(line: str) -> str:
+    """Return a line without remark (#) and outer blanks."""
+    return _REMARK.split(line, maxsplit=1)[0].strip()
+
+
+def _fields(text, delimiter):
+    """Split a line into fields without quotes and outer blanks."""
+    if delimiter == " ":
+        fields = text.split()
+    elif '"' in text:
+        fields = next(csv.reader([text], delimiter=delimiter, skipinitialspace=True))
+    else:
+        fields = text.split(delimiter)
+    return [field.strip(' "') for field in fields]
+
+
+def _count_fields(text, delimiter):
+    if delimiter == " " or '"' in text:
+        return len(_fields(text, delimiter))
+    return text.count(delimiter) + 1
+
+
+def _is_number(field):
+    """Return whether a field is a number or a word for a missing height."""
+    return field in _MISSING or _NUMBER.fullmatch(field) is not None
+
+
+def _read_numbers(rows, layout):
+    """Read rows of numbers with pandas; raise UnfitTopography that names the first field that is not a number."""
+    import pandas as pd  # slow to import
+
+    try:
+        # pandas would read the word "true" as 1.
+        if not any(re.search("true|false", text, re.IGNORECASE) for _, text in rows):
+            return pd.read_csv(
+                io.BytesIO("\n".join(text for _, text in rows).encode()),
+                sep=r"\s+" if layout.delimiter == " " else layout.delimiter,
+                decimal=layout.decimal,
+                quotechar='"',
+                skipinitialspace=True,
+                header=None,
+                names=range(layout.fields),
+                index_col=False,
+                dtype=float,
+                na_values=list(_MISSING),
+                keep_default_na=False,
+                skip_blank_lines=False,
+                encoding="utf-8",
+            ).to_numpy()
+    except ValueError:
+        pass
+    for line, text in rows:
+        fields = _fields(text, layout.delimiter)
+        for k, field in enumerate(fields):
+            if not _is_number(field) or {",": ".", ".": ","}[layout.decimal] in field:
+                raise _not_a_number(field, k, line)
+    raise UnfitTopography("path", f"has a field that is not a number between lines {rows[0][0]} and {rows[-1][0]}")
+
+
+def _not_a_number(field, index, line):
     return UnfitTopography(
         "path",
-        f"has {fields[index][:40]!r} in line {line}, column {index + 1}; expected a number, or NaN where a point is "
+        f"has {field[:40]!r} in line {line}, column {index + 1}; expected a number, or NaN where a point is "
         "missing. Correct or remove the line",
     )
 
 
-def _first_lines(path):
-    """Read the lines at the beginning of a text file; return an empty list if the file is not text."""
-    with open_text(path) as file:
-        start = file.read(_BEGINNING)
-    return [] if "\0" in start else start.splitlines()[:_LONGEST_HEADING]
-
-
-def _count_columns(fields):
-    """Count the fields of a line, without an empty last field after a delimiter."""
-    return len(fields) - (len(fields) > 1 and fields[-1] == "")
-
-
-def _find_layout(path: Path) -> Layout | None:
-    """Find the first line of numbers and the notation of the numbers; None if the file is not a text with numbers.
+def _find_layout(lines: list[str]) -> Layout | None:
+    """Find the first line of numbers, and the notation of the numbers; None if the text has no numbers.
 
     Raises UnfitTopography if commas may be decimal or delimiters, or if the line above the numbers is a damaged row.
     """
-    lines = _first_lines(path)
-    for number, line in enumerate(lines):
-        if not (text := strip_remark(line)):
+    start, stated = _known_beginning(lines)
+    damage = None
+    for number, line in enumerate(lines[start:], start):
+        text = _clean(line)
+        if not text.strip():
             continue
-        notation = Notation.of_line(text)
-        if notation.delimiter == "," and are_decimal_between_blanks(text):
-            raise UnfitTopography(
-                "path",
-                f"has commas in {text[:40]!r} that may be decimal signs or delimiters; expected decimal points. "
-                "Replace the commas",
-            )
-        fields = notation.fields(text)
-        numbers = [notation.number(field) for field in fields]
-        if None not in numbers and not np.isnan(np.array(numbers, dtype=float)).all():
-            if number and (damage := _find_damage(strip_remark(lines[number - 1]), number, notation)):
-                raise damage
-            notation = _decide_on_commas(notation, lines[number:], len(fields))
-            return Layout(tuple(lines[:number]), notation, _count_columns(fields))
+        if delimiter := _find_delimiter(text):
+            break
+        damage = _find_damage(text, number + 1)
+    else:
+        if damage := first_damaged_line(lines):
+            raise damage
+        return None
+    if damage and number and _find_damage(_clean(lines[number - 1]), number):
+        raise damage
+    texts = [text for line in lines[number:] if (text := _clean(line, delimiter)).strip()]
+    counts = Counter(_count_fields(text, delimiter) for text in texts)
+    fields = max(counts, key=counts.__getitem__)
+    # Rows of missing heights above the first number belong to the table.
+    while number > start and fields > 1:
+        above = _fields(_clean(lines[number - 1], delimiter), delimiter)
+        if len(above) != fields or not all(field in _MISSING for field in above):
+            break
+        number -= 1
+    decimal = _find_decimal_sign([_fields(text, delimiter) for text in texts], delimiter)
+    wrapped = delimiter == " " and stated not in (None, fields)
+    ends = delimiter != " " and fields > 1 and all(text.endswith(delimiter) for text in texts)
+    fields = stated if wrapped else fields
+    return Layout(tuple(lines[:number]), delimiter, decimal, fields, fields - ends, wrapped)
+
+
+def _known_beginning(lines):
+    """Return the number of heading lines, and the columns (or None), that the heading of a known format states.
+
+    Sources: help of Golden Software on the text grids of Surfer 6 (DSAA, columns and rows, then three lines with the
+    ranges of x, y and z); description of the ASCII grids of ArcGIS by Esri; the heading of Zygo's text files ends with
+    a line #.
+    """
+    first = lines[0].strip() if lines else ""
+    if first == "DSAA":
+        return 5, int(lines[1].split()[0])
+    if first.startswith("Zygo "):
+        return next((k for k, line in enumerate(lines, 1) if line.strip() == "#"), 0), None
+    stated = {
+        name.lower(): int(count)
+        for name, count in re.findall(r"(?im)^\W*(ncols|nrows)\W+(\d+)\s*$", "\n".join(lines[:20]))
+    }
+    return 0, stated["ncols"] if len(stated) == 2 else None
+
+
+def _find_delimiter(text):
+    """Return the delimiter of a line of numbers; None for other lines.
+
+    Raises UnfitTopography if commas may be decimal signs or delimiters.
+    """
+    numbers = re.split(r",?\s+", text.strip())
+    if len(numbers) > 1 and "\t" not in text and all(map(_DECIMAL_COMMA.fullmatch, numbers)):
+        raise UnfitTopography(
+            "path",
+            f"has commas in {text[:40]!r} that may be decimal signs or delimiters; expected decimal points. "
+            "Replace the commas",
+        )
+    for delimiter in "\t;, ":
+        fields = _fields(text, delimiter)
+        if all(map(_is_number, fields)) and not all(field in _MISSING for field in fields):
+            return delimiter
     return None
 
 
-def _find_damage(text, number, notation):
+def _find_damage(text, number):
     """Return the error for a damaged row, where most but not all fields are numbers; None for other lines."""
-    fields = notation.fields(text)
-    wrong = [k for k, field in enumerate(fields) if notation.number(field) is None]
-    words = [k for k in wrong if not LIKE_A_NUMBER.match(fields[k])]
+    delimiter = next((each for each in "\t;," if each in text), " ")
+    fields = _fields(text, delimiter)
+    wrong = [k for k, field in enumerate(fields) if not _is_number(field)]
+    words = [k for k in wrong if not _LIKE_A_NUMBER.fullmatch(fields[k])]
     if not wrong or len(fields) < _FEWEST_FIELDS or 2 * len(words) > len(fields):
         return None
-    return _not_a_number(fields, wrong[0], number)
+    return _not_a_number(fields[wrong[0]], wrong[0], number)
 
 
-def _decide_on_commas(notation, lines, count):
-    """Decide from all lines with `count` fields whether commas are decimal signs; return the completed notation.
+def first_damaged_line(lines: list[str]) -> UnfitTopography | None:
+    """Return the error for the first damaged row, where most but not all fields are numbers; None if there is none."""
+    return next(filter(None, (_find_damage(_clean(line), number) for number, line in enumerate(lines, 1))), None)
 
-    Raises UnfitTopography if it is not clear whether the commas are decimal signs.
-    """
-    rows = [notation.fields(text) for line in lines if (text := strip_remark(line))]
-    rows = [row[: _count_columns(row)] for row in rows if len(row) == count]
+
+def _find_decimal_sign(rows, delimiter):
+    """Find the decimal sign from rows of fields; raise UnfitTopography if it is not clear."""
     fields = [field for row in rows for field in row]
     with_comma = [field for field in fields if "," in field]
     if with_comma and all(map(AMBIGUOUS_COMMA.fullmatch, with_comma)):
@@ -201,105 +386,66 @@ def _decide_on_commas(notation, lines, count):
             f"has numbers such as {with_comma[0]}, whose comma may be decimal or separate thousands; expected decimal "
             "points. Replace or remove the commas",
         )
-    if notation.delimiter == "," and not with_comma and are_halves_of_decimals(rows):
+    if delimiter == "," and not with_comma and _are_halves_of_decimals(rows):
         raise UnfitTopography(
             "path",
             f"has both decimal commas and commas as delimiters, as in {','.join(rows[0][:4])}; expected decimal "
             "points, semicolons as delimiters, or quotes around numbers with decimal commas",
         )
-    return replace(notation, decimal_comma=notation.decimal_comma or has_decimal_commas(fields))
+    return "," if with_comma and not any("." in field for field in fields) else "."
 
 
-def first_damaged_line(path: Path) -> UnfitTopography | None:
-    """Return the error for the first damaged row, where most but not all fields are numbers; None if there is none."""
-    texts = map(strip_remark, _first_lines(path))
-    damages = (_find_damage(text, number, Notation.of_line(text)) for number, text in enumerate(texts, 1))
-    return next(filter(None, damages), None)
+def _are_halves_of_decimals(rows):
+    """Return whether even columns may be the digits after decimal commas: unsigned, and of the same number.
 
-
-# The next functions find rows and columns of coordinates or of point numbers. Heights of a rough surface do not rise in
-# equal steps along a row or column. If heights rise in equal steps in all rows, the surface is a plane.
-
-
-def drop_coordinates(values: np.ndarray) -> tuple[np.ndarray, tuple[float, float] | None, str]:
-    """Remove the first row or column of a table if it contains coordinates or point numbers instead of heights.
-
-    Returns
-    -------
-    Heights; steps of the coordinates along x and y, or None without both coordinates; and a remark on removed parts.
-
-    Raises UnfitTopography if the first row or column seems to contain coordinates with unequal steps, or if the last
-    row or column contains numbers with equal steps.
+    Columns of integers may look the same. Evidence is a leading zero, or odd columns that are not like the even ones.
     """
-    heights, steps = values, {}
-    for name in ("row", "column"):
-        table = heights if name == "row" else heights.T
-        first, last = _coordinate_step(table), _coordinate_step(table[::-1])
-        uneven = first is not None and np.isnan(first)
-        if uneven or (last is not None and not np.isnan(last)):
-            raise UnfitTopography(
-                "path",
-                f"has a {'first' if uneven else 'last'} {name} of numbers that seem to be coordinates; "
-                f"expected heights on a regular grid. Remove the {name}, or interpolate the heights. If all numbers "
-                "are heights, save them as a .npy file",
-            )
-        if first is not None:
-            steps[name] = first
-            heights = table[1:] if name == "row" else table[1:].T
-    remark = f"first {' and '.join(steps)} left out: numbers in equal steps, not heights" if steps else ""
-    return heights, (steps["row"], steps["column"]) if len(steps) == 2 else None, remark
-
-
-def _coordinate_step(table):
-    """Return the step of the coordinates in the first line of a table: nan if steps differ, None if it has heights."""
-    line, others = table[0], table[1:3]
-    if len(table) < 3 or len(line) < _FEWEST_COORDINATES or any(_equal_step(each) is not None for each in others):
-        return None
-    step = _equal_step(line, rounded=False)
-    if step is None and not _resembles(line[1:], others[:, 1:]):
-        step = _equal_step(line)
-        differences = np.diff(line[1:])
-        if step is None and (np.all(differences > 0) or np.all(differences < 0)):
-            step = np.nan
-    return None if step is None else abs(step)
-
-
-def _resembles(line, others):
-    """Return whether the heights in a line are similar to the heights in the next two lines."""
-    known = np.isfinite(line) & np.all(np.isfinite(others), axis=0)
-    if np.count_nonzero(known) < 3:
+    after = [field for row in rows for field in row[1::2]]
+    before = [field for row in rows for field in row[: 2 * (len(row) // 2) : 2]]
+    alike = re.compile(rf"\d{{{len(after[0])}}}") if after else None
+    if (
+        len(rows[0]) < 4
+        or not all(map(alike.fullmatch, after))
+        or not all(re.fullmatch(r"[-+]?\d+", b) for b in before)
+    ):
         return False
-    line, others = line[known], others[:, known]
-    same = np.mean(np.sign(np.diff(line)) == np.sign(np.diff(others[0])))
-    usual = np.std(others[0] - others[1])
-    smooth = usual <= _SMOOTH * np.std(others[0])
-    return (same >= _SAME_SIGN or smooth) and np.std(line - others[0]) <= _DIFFERENCE * usual
+    return any(field[0] == "0" < field for field in after if len(field) > 1) or not all(map(alike.fullmatch, before))
 
 
-def _equal_step(line: np.ndarray, *, rounded: bool = True) -> float | None:
-    """Return the step from number to number in a line; None if the steps differ, also without the first number.
+# Rows and columns are never left out. But the numbers along an edge of a table are probably coordinates or point
+# numbers if they rise or fall in equal steps, and those of most other lines do not; or if no other line is monotonic.
 
-    rounded : True if steps may differ because numbers are rounded to few digits.
-    """
-    for numbers in (line, line[1:]):
-        steps = np.diff(numbers)
-        if not len(steps) or not np.all(np.isfinite(steps)):
+
+def refuse_coordinates(values: np.ndarray) -> None:
+    """Raise UnfitTopography if an outer row or column seems to contain coordinates or point numbers, not heights."""
+    for name, table in (("row", values), ("column", values.T)):
+        if len(table) < 3 or table.shape[1] < _FEWEST_COORDINATES:
             continue
-        mean = float(numbers[-1] - numbers[0]) / len(steps)
-        if mean and np.ptp(steps) <= _EQUAL_STEPS * abs(mean):
-            return mean
-        if not rounded:
-            continue
-        # Rounding shifts every number by up to half a unit of the last digit.
-        unit = _last_digit(numbers)
-        error = np.max(np.abs(numbers - numbers[0] - mean * np.arange(len(numbers))))
-        if np.all(steps * mean >= 0) and error <= 1.001 * unit and np.ptp(numbers) >= _FEWEST_UNITS * unit:
-            return mean
-    return None
+        for place, line in (("first", table[0]), ("last", table[-1])):
+            # The corner may belong to the other axis.
+            for part in (slice(1, None), slice(-1)):
+                if _seems_an_axis(line[part], table[1:-1, part]):
+                    raise UnfitTopography(
+                        "path",
+                        f"has a {place} {name} of numbers, {line[1]:g}, {line[2]:g}, {line[3]:g} …, that seem to be "
+                        f"coordinates or numbers of points. Remove the {name} if so, or save all numbers as a .npy "
+                        "file if they are heights",
+                    )
 
 
-def _last_digit(numbers):
-    """Return the probable unit of the last digit of the largest number, such as 0.01 for 3.25."""
-    largest = np.max(np.abs(numbers))
-    digits = max(len(f"{abs(number):.14e}".partition("e")[0].replace(".", "").rstrip("0")) for number in numbers)
-    return 10.0 ** (np.floor(np.log10(largest)) + 1 - digits) if largest else 0.0
+def _seems_an_axis(line, body):
+    """Return whether a line is monotonic, with similar steps or unlike all lines of the body of a table."""
+    if _has_similar_steps(line):
+        return 2 * sum(map(_has_similar_steps, body)) < len(body)
+    return _is_monotonic(line) and not any(map(_is_monotonic, body))
+
+
+def _is_monotonic(line):
+    steps = np.diff(line)
+    return bool((np.all(steps >= 0) or np.all(steps <= 0)) and np.any(steps))
+
+
+def _has_similar_steps(line):
+    """Return whether a line rises or falls in equal steps, up to rounding to few digits."""
+    steps = np.abs(np.diff(line))
+    return _is_monotonic(line) and np.max(steps) <= _SIMILAR_STEPS * np.min(steps[steps > 0])
