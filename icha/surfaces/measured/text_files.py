@@ -63,8 +63,17 @@ _LENGTHS = re.compile(rf"{_NUMBER}\s*(\S+?)?(?:\s*[x×*]\s*{_NUMBER}\s*(\S+)?)?$
 _ENTRY = re.compile(r"^[#%/\s']*([A-Za-z][A-Za-z _./()-]*?)\s*(?:[:=,;\t]\s*|\s+(?=[-+]?\d))(.+?)[\s',;]*$")
 # Names of entries in a heading, in small letters and without punctuation; the last ones are Keyence's.
 _SIZES = ("size", "scan size", "scan range", "scan area", "field of view")
-_PIXELS = ("pixel", "pixel size", "pixel spacing", "point spacing", "spacing", "cell size", "cellsize")
-_PIXELS += ("xy calibration", "xy justierung")
+_PIXELS = (
+    "pixel",
+    "pixel size",
+    "pixel spacing",
+    "point spacing",
+    "spacing",
+    "cell size",
+    "cellsize",
+    "xy calibration",
+    "xy justierung",
+)
 _HEIGHT_UNITS = ("z unit", "z units", "value unit", "value units", "height unit", "height units", "data unit")
 _UNITS = ("unit", "units", "einheit")
 _COUNTS = {
@@ -348,7 +357,7 @@ def _is_image(lines: Sequence[str]) -> bool:
 def _counts_agree(lines: Sequence[str], shape: tuple[int, int]) -> bool:
     """Return whether the heading states the rows and columns of a table; raise UnfitTopography if it states others."""
     entries = _entries(lines)
-    counts = {}
+    counts: dict[str, tuple[int, str]] = {}
     for axis, names in _COUNTS.items():
         for name in names:
             if name in entries and entries[name][0].isdecimal():

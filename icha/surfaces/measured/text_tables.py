@@ -354,7 +354,9 @@ def _find_delimiter(text):
             "Replace the commas",
         )
     for delimiter in "\t;, ":
-        fields = _fields(text, delimiter)
+        fields = _fields(text, delimiter) if delimiter in text or delimiter == " " else [text]
+        if len(fields) == 1 and (delimiter != " " or "," in text):
+            continue
         if all(map(_is_number, fields)) and not all(field in _MISSING for field in fields):
             return delimiter
     return None
