@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 from threadpoolctl import threadpool_limits
 
-from icha.asperity.full_contact import FULL_CONTACT_BELOW, HIGH_PULL_OFF_BELOW, full_contact_energy_ratio
+from icha.asperity.full_contact import HIGH_PULL_OFF_BELOW, full_contact_energy_ratio
 from icha.asperity.material import Material
 from icha.asperity.stickiness import stickiness
 from icha.checks.run import check_run, reasons_of_failure
@@ -53,6 +53,7 @@ from icha.path.targets import (
     WITHOUT_ADHESION,
     Path,
     Target,
+    largest_area_fraction,
 )
 from icha.references.indenter_runs import loop_values, sphere_radius, step_values
 from icha.support.rules import IntegerRange
@@ -282,20 +283,18 @@ def asperity_applicability(
     contact_area_fraction : largest contact area fraction A/A0 of the run.
     conformal : True for roughness on a shape that presses it into the elastic body.
     """
-    reasons = []
-    if full_contact_energy_ratio < FULL_CONTACT_BELOW:
+    reasons, ratio = [], f"U_full/dgamma = {full_contact_energy_ratio:.3g}"
+    if conformal and full_contact_energy_ratio < HIGH_PULL_OFF_BELOW:
         reasons.append(
-            "full contact has a lower energy than separated surfaces (U_full/dgamma = "
-            f"{full_contact_energy_ratio:.3g}, less than {FULL_CONTACT_BELOW:g})"
-        )
-    elif conformal and full_contact_energy_ratio < HIGH_PULL_OFF_BELOW:
-        reasons.append(
-            "the elastic body conforms to most of the roughness under the shape (U_full/dgamma = "
-            f"{full_contact_energy_ratio:.3g}, less than {HIGH_PULL_OFF_BELOW:g})"
+            f"the elastic body conforms to most of the roughness under the shape ({ratio}, less than "
+            f"{HIGH_PULL_OFF_BELOW:g})"
         )
     reasons += summit_reasons
-    if contact_area_fraction > MAX_AREA_FRACTION * (1 + _AREA_TOLERANCE):
-        reasons.append(f"contact area A/A0 = {contact_area_fraction:.3g}, more than {MAX_AREA_FRACTION:g}")
+    # The contact area on a shape is no measure of the distance between spots.
+    limit = MAX_AREA_FRACTION if conformal else largest_area_fraction(full_contact_energy_ratio)
+    if contact_area_fraction > limit * (1 + _AREA_TOLERANCE):
+        because = f", because adhesion unites neighbouring spots ({ratio})" if limit < MAX_AREA_FRACTION else ""
+        reasons.append(f"contact area A/A0 = {contact_area_fraction:.3g}, more than {limit:.3g}{because}")
     return f"asperity model not applicable: {'; '.join(reasons)}" if reasons else ""
 
 

@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from icha.asperity.full_contact import FULL_CONTACT_BELOW, HIGH_PULL_OFF_BELOW, MEANING, expected_behaviour
+from icha.asperity.full_contact import HIGH_PULL_OFF_BELOW, MEANING, expected_behaviour
 from icha.asperity.material import WU_HOLDS_FROM
 from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets.attributes import reasons_not_applicable
 from icha.datasets.labels import LABELS, is_derived_study
 from icha.datasets.variables.campaign import COMPUTED_RUNS
+from icha.path.targets import MAX_AREA_FRACTION, largest_area_fraction
 from icha.support.formatting import format_count, format_quantity
 from icha.surfaces.moments import RESOLVED_CELLS, cells_per_short_wave, error_of_cells
 
@@ -186,9 +187,11 @@ def _full_contact(cases):
         text += "; in the bearing area model, the surface sticks below the rms height {}; its rms height is {}".format(
             *heights
         )
-    if any(MODELS[case.model].by_summits and case.ratio < FULL_CONTACT_BELOW for case in cases):
-        text += f"; the asperity model is not applicable below {FULL_CONTACT_BELOW:g}"
-    yield Statement("adhesion", text, lowest.ratio >= HIGH_PULL_OFF_BELOW)
+    ratios = [case.ratio for case in adhesive if MODELS[case.model].by_summits]
+    limit = largest_area_fraction(min(ratios, default=math.inf))
+    if limit < MAX_AREA_FRACTION:
+        text += f"; the asperity model is applicable up to the contact area A/A0 = {limit:.2g}"
+    yield Statement("adhesion", text, lowest.ratio >= HIGH_PULL_OFF_BELOW and limit == MAX_AREA_FRACTION)
 
 
 def _unresolved_strength(facts):

@@ -93,9 +93,9 @@ def test_sticky_materials_are_named():
     assert "(pdms on rough: U_full/dgamma 0.14, validated: 76 and more)" in found["accuracy"][0]
     text, good = found["adhesion"]
     assert not good and "about 0.138 or more (pdms on rough)" in text
-    assert "not applicable below 1" in text
-    text, good = told({}, [case(INSIDE)])["adhesion"]
-    assert good and "about 140 or more (soft on rough)" in text and "not applicable" not in text
+    assert text.endswith("the asperity model is applicable up to the contact area A/A0 = 0.0028")
+    text, good = told({}, [case(INSIDE), case({**INSIDE, "full_contact_energy_ratio": 20.0})])["adhesion"]
+    assert good and "about 20 or more (soft on rough)" in text and "applicable" not in text
 
 
 def test_the_range_of_the_validation_is_that_of_its_surfaces():

@@ -1,0 +1,56 @@
+"""The asperity model says where adhesion makes its areas or gaps wrong."""
+
+import math
+
+import pytest
+
+from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
+from icha.path.targets import largest_area_fraction
+from icha.simulation import asperity_applicability
+from validation.applicability import COUNT, WRONG_FACTOR, State, case, largest_factor, press, reference, states
+
+# Numbers of a random surface, a random surface with Gaussian amplitudes and two waves: U_full/dgamma is 1.5, 2.1, 1.4.
+STICKY = (20, 31, 53)
+# Two waves and an egg box with adhesion; bumps, a scan and ridges without.
+RIGHT = (33, 12, 6, 39, 44)
+
+
+@pytest.mark.parametrize("number", STICKY)
+def test_wrong_areas_of_sticky_surfaces_are_marked(number):
+    _, surface, material = case(number)
+    assert surface.full_contact_energy > material.adhesion_length
+    run = press(surface, material, DEFAULT_MODEL, 0.01)
+    assert largest_factor(states(run), reference(number)) > WRONG_FACTOR
+    assert "adhesion unites neighbouring spots" in run.attrs["applicability"]
+
+
+@pytest.mark.parametrize("number", RIGHT)
+def test_right_areas_are_not_marked(number):
+    _, surface, material = case(number)
+    run = press(surface, material, DEFAULT_MODEL, 0.01)
+    assert largest_factor(states(run), reference(number)) < WRONG_FACTOR
+    assert run.attrs["applicability"] == ""
+
+
+def test_saved_results_are_those_of_boundary_elements():
+    _, surface, material = case(52)
+    found = states(press(surface, material, REFERENCE_MODEL, 1e-3))
+    assert found[1e-3] == pytest.approx(reference(52)[1e-3], rel=1e-5)
+    assert all(reference(number) for number in range(COUNT))
+
+
+def test_the_limit_of_the_area_grows_with_the_energy_of_full_contact():
+    assert largest_area_fraction(math.inf) == largest_area_fraction(50.0) == 0.25
+    assert largest_area_fraction(2.0) == pytest.approx(0.04)
+    assert asperity_applicability(2.0, contact_area_fraction=0.039) == ""
+    assert "A/A0 = 0.041, more than 0.04, because adhesion" in asperity_applicability(2.0, contact_area_fraction=0.041)
+    # Under a shape, the area of the square does not matter.
+    assert asperity_applicability(2.5, contact_area_fraction=0.2, conformal=True) == ""
+    assert asperity_applicability(math.inf, contact_area_fraction=0.3).endswith("more than 0.25")
+
+
+def test_only_resolved_patches_are_compared():
+    found, exact = {1e-3: State(0.1, 2.0, 1.0), 1e-2: State(0.2, 1.0, 3.0)}, {1e-3: State(0.3, 2.0, 1.9)}
+    assert math.isnan(largest_factor(found, exact))
+    assert largest_factor(found, exact | {1e-2: State(0.25, 1.1, 2.1)}) == pytest.approx(1.25)
+    assert largest_factor(found, exact | {1e-2: State(0.25, 0.0, 2.1)}) == math.inf
