@@ -56,9 +56,11 @@ from icha.path.targets import (
     largest_area_fraction,
 )
 from icha.references.indenter_runs import loop_values, sphere_radius, step_values
+from icha.references.limits import doubts, tabor_parameter_of
 from icha.support.rules import IntegerRange
 from icha.support.usual import IchaWarning, unusual_arguments
 from icha.surfaces.moments import height_statistics, slope_anisotropy, spectral_moments
+from icha.surfaces.resolution import shortest_wave
 from icha.surfaces.shapes import describe_shape
 from icha.surfaces.summits import SummitCoverage, locate_summits
 from icha.surfaces.surface import Surface, full_contact_pressure
@@ -152,7 +154,7 @@ def simulate(
     seed = IntegerRange(-1).validate("seed", seed)
     if progress is None and _LOGGER.isEnabledFor(logging.INFO):
         progress = _LOGGER.info
-    for text in _unusual_arguments(surface, material):
+    for text in (*_unusual_arguments(surface, material), *doubts(surface, material, path, model)):
         warnings.warn(text, IchaWarning, stacklevel=2)
     dataset = _compute(solver, surface, material, path, model, seed, progress, kept)
     if dataset.attrs["applicability"]:
@@ -518,6 +520,7 @@ def _target_unit(kinds: set[str], named_by: str) -> dict:
 def _surface_values(surface: Surface, material: Material, seed: int) -> dict:
     """Return the values of the surface and the material, by variable name."""
     moments, (skewness, kurtosis) = spectral_moments(surface), height_statistics(surface)
+    wavelength, estimated = shortest_wave(surface)
     # Pressure in full contact at zero load, for E* = 1. Half its work on the heights is the elastic energy.
     pressure = full_contact_pressure(surface.heights, surface.period, free=surface.free, softness=softness_of(material))
     complete = -float(pressure.min()) * material.contact_modulus
@@ -526,11 +529,13 @@ def _surface_values(surface: Surface, material: Material, seed: int) -> dict:
         **get_values(material, *MATERIAL, "flaw_radius"),
         **get_values(surface, *ROUGHNESS, "unit_height", "unit_slope", "period", "boundary", "grid"),
         "seed": seed,
+        "short_wavelength": wavelength,
+        "short_wavelength_estimated": int(estimated),
         "spectral_moment_0": moments.m0,
         "spectral_moment_2": moments.m2,
         "spectral_moment_4": moments.m4,
         "nayak_parameter": moments.nayak_parameter,
-        "tabor_parameter": material.tabor_parameter(surface.summit_radius),
+        "tabor_parameter": tabor_parameter_of(surface, material),
         "stickiness": stickiness(moments, material),
         "full_contact_energy_ratio": full_contact_energy_ratio(
             energy, material.contact_modulus, material.surface_energy

@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull
 
 from icha.boundary_elements.patches import CellState, free_edges, label_patches, labels_at, patch_centres
 from icha.contact.model import PRESSURE_BINS, gap_bins
-from icha.surfaces.moments import LEAST_CELLS_PER_WAVE, cells_per_short_wave
+from icha.surfaces.resolution import NYQUIST_CELLS, resolution_of
 from icha.surfaces.surface import Surface
 
 if TYPE_CHECKING:
@@ -88,11 +88,10 @@ class PatchObservables:
 
     def reasons_against(self, separations: Iterable[float], pressed: CellState | None) -> list[str]:
         """Return reasons against the results: too few grid cells for the shortest waves. The arguments are not used."""
-        asperities, grid = self.contact.asperities, self.surface.grid
-        cells = cells_per_short_wave(grid, len(asperities) + len(asperities.unsupported_height))
-        if cells >= LEAST_CELLS_PER_WAVE:
+        resolution = resolution_of(self.surface)
+        if resolution.representable:
             return []
-        return [f"about {cells:.2g} grid cells for the shortest waves (at least {LEAST_CELLS_PER_WAVE:g} expected)"]
+        return [f"{resolution} (at least {NYQUIST_CELLS} expected)"]
 
     def _gap_density(self, gap, state, areas):
         """Return the probability density of the gap outside contact; its integral plus the area fraction is one."""

@@ -132,7 +132,7 @@ def print_plan(path: Path, campaign, workflow: Path, home: Path, cores: int, *, 
         if item.is_run and item.state == FAILED:
             print_line("red", "failed", f"{item.path}: {item.reason}")
     for statement in expected_validity(campaign):
-        print_line("bold", statement.about, statement.text)
+        print_line("bold" if statement.good else "bold yellow", statement.about, statement.text)
     problem = licence_problem(campaign)
     obstacles = {
         "cannot be run": find_conflict(shorten_path(results), campaign.name, path, workflow),

@@ -106,14 +106,13 @@ def keys_for_defects(scan) -> list[str]:
 
 def _resolution(scan, to_scale: bool, models: list[Model]) -> Iterator[str]:
     """Yield lines on the resolution of summits and waves, and on models that are not applicable."""
-    from icha.surfaces.measured.resolution import LEAST_CELLS_OF_SUMMIT, RESOLVED_CELLS
-    from icha.surfaces.moments import LEAST_CELLS_PER_WAVE, error_of_cells
+    from icha.surfaces.resolution import RECOMMENDED_CELLS
 
     used = scan.surface
     scale = f" {formatting.length(used.spacing)} apart, rms slope {used.rms_slope:.3g}" if to_scale else ""
     yield (
-        f"{used.grid} x {used.grid} nodes{scale}, {format_count(scan.summits, 'summit')}, {scan.cells_per_summit:.0f} "
-        f"nodes per summit (recommended: at least {LEAST_CELLS_OF_SUMMIT})"
+        f"{used.grid} x {used.grid} nodes{scale}, {format_count(scan.summits, 'summit')}, about {scan.resolution}; "
+        f"recommended: at least {RECOMMENDED_CELLS}"
     )
     if unsupported := len(scan.asperities.unsupported_height):
         yield (
@@ -122,16 +121,10 @@ def _resolution(scan, to_scale: bool, models: list[Model]) -> Iterator[str]:
         )
     reasons = scan.reasons_against_asperities
     if reasons and (not models or any(model.by_summits for model in models)):
-        other_model = ", or `models: [boundary_elements]`" if scan.cells_per_short_wave >= LEAST_CELLS_PER_WAVE else ""
+        other_model = ", or `models: [boundary_elements]`" if scan.resolution.representable else ""
         yield (
             f"warning: asperity model not applicable ({'; '.join(reasons)}); use a `cutoff` that smooths the surface"
             f"{other_model}"
-        )
-    error = error_of_cells(scan.cells_per_short_wave)
-    if error and any(model.by_cells for model in models):
-        yield (
-            f"boundary elements have about {scan.cells_per_short_wave:.2g} nodes per shortest wave, so areas have an "
-            f"error of {error}; recommended: {RESOLVED_CELLS} nodes, with a longer `cutoff` or a finer `grid`"
         )
 
 

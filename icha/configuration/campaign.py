@@ -31,15 +31,14 @@ from icha.datasets.labels import is_derived_study
 from icha.path.targets import FORCE, INDENTATION, QUANTITIES, WITHOUT_ADHESION, Target
 from icha.support import formatting
 from icha.support.input_files import read_columns
-from icha.support.values import ROUNDING, Name, Problem, Section, Text, distinct
+from icha.support.values import Name, Problem, Section, Text, distinct
+from icha.surfaces.resolution import Resolution
 
 # In these sections, boundary elements solve contacts of a study.
 BESIDE_STUDIES = ("finite_range", "boundary_element_loops")
 # Largest number of entries in a section. The number is small, because the check of an entry goes through all runs of
 # its study.
 _FEW = Field(max_length=100)
-# Least numbers of grid cells per shortest wavelength without a warning: for asperities alone, and for other models.
-_LEAST_CELLS, _ADVISABLE_CELLS = 4, 8
 
 
 class Contact(NamedTuple):
@@ -66,6 +65,8 @@ class Topography(NamedTuple):
     sha256 : SHA-256 of the file.
     full_contact_energy : elastic energy of full contact per area, divided by E*, at rms slope 1, m.
     complete_contact_pressure : pressure of complete contact without adhesion, divided by E*, at rms slope 1.
+    rms_curvature : rms curvature of profiles at rms slope 1, 1/m.
+    shortest_wave : shortest wavelength of the surface, m, and whether it is an estimate.
     """
 
     grid: int
@@ -75,6 +76,8 @@ class Topography(NamedTuple):
     full_contact_energy: float
     complete_contact_pressure: float
     rms_height: float
+    rms_curvature: float
+    shortest_wave: tuple[float, bool]
 
     def slope_of(self, slope: str | RmsHeight) -> float:
         """Return the rms slope for the word `measured`, or the rms slope that gives an rms height."""
@@ -199,6 +202,16 @@ class Campaign(Section):
         """Return the side of a surface, m; if the surface comes from a file, the file must have been read."""
         return self._grid_and_period(surface).period
 
+    def resolution(self, surface: str) -> Resolution:
+        """Return the number of grid cells per shortest wave of a surface; its file must have been read."""
+        section, topography = self.surfaces[surface], self.topography(surface)
+        wavelength, estimated = topography.shortest_wave if topography else (math.inf, False)
+        if topography is None and not section.smooth:
+            wavelength = section.short_wavelength
+        if section.shape is not None and section.shape.shape.shortest_wave < wavelength:
+            wavelength, estimated = section.shape.shape.shortest_wave, False
+        return Resolution(wavelength * self.grid(surface) / self.period(surface), estimated=estimated)
+
     def _grid_and_period(self, surface):
         """Return the object with the grid and the period of a surface; both are missing if its file is not read."""
         return self.topography(surface) or self.surfaces[surface]
@@ -295,18 +308,6 @@ class Campaign(Section):
                 layer, cell = formatting.length(thickness), formatting.length(known.period / known.grid, 3)
                 reason = f"contains the layer {label!r} of {layer}, thinner than a grid cell of {name!r} ({cell})"
                 yield ("materials",), study.materials, f"{reason}; expected a thicker layer or a finer grid"
-        for (index, label), name in itertools.product(enumerate(study.models), study.surfaces):
-            surface, model = self.surfaces[name], MODELS[label]
-            least = model.least_cells
-            if surface.cells_per_short_wave < least * (1 - ROUNDING):
-                enough, better = surface.grid_of_cells(least), surface.grid_of_cells(_ADVISABLE_CELLS)
-                yield (
-                    ("models", index),
-                    label,
-                    f"need at least {least} grid cells per shortest wavelength, but {name!r} has "
-                    f"{surface.cells_per_short_wave:.3g}; expected asperities, or a `grid` of {enough} or more for "
-                    f"{name!r} (better {better})",
-                )
 
     def _tension_problems(self, study: Study) -> Iterator[Problem]:
         """Yield a problem for each load that a material without adhesion cannot have."""
@@ -337,26 +338,6 @@ class Campaign(Section):
                 reason += f"{given}; expected a side of at least {least}, or smaller targets"
                 key = QUANTITIES[kind].plural
                 yield ("targets", key, len(getattr(study.targets, key)) - 1), value, reason
-
-    def warnings(self) -> list[str]:
-        """Return a warning for each random surface whose grid is valid but coarse."""
-        expected: dict[str, int] = {}
-        for label, study in self.studies.items():
-            if is_derived_study(label, self.studies):
-                continue
-            least = _ADVISABLE_CELLS if any(MODELS[model].by_cells for model in study.models) else _LEAST_CELLS
-            expected |= {name: max(least, expected.get(name, 0)) for name in study.surfaces}
-        found = []
-        for name, least in expected.items():
-            surface, origin = self.surfaces[name], self.origin("surfaces", name)
-            if surface.random and surface.cells_per_short_wave < least * (1 - ROUNDING):
-                variant = "" if origin == name else f" (variant {name})"
-                found.append(
-                    f"surfaces.{origin}.grid: {surface.grid!r} gives {surface.cells_per_short_wave:.3g} grid cells per "
-                    f"shortest wavelength{variant}, so areas have errors of some per cent; expected a grid of at least "
-                    f"{surface.grid_of_cells(least)}, better {surface.grid_of_cells(_ADVISABLE_CELLS)}"
-                )
-        return found
 
     def resolve_paths(self, folder: FilePath) -> Campaign:
         """Return the campaign with `folder` added in front of all paths of files."""

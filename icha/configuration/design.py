@@ -20,10 +20,10 @@ from icha.configuration.errors import MOST_PROBLEMS, problem_of
 from icha.configuration.samples import RULES
 from icha.configuration.studies import MEASURED, SCALARS, RmsHeight, Study, slope_of_height
 from icha.configuration.surfaces import SURFACE_KINDS, MaterialSection
-from icha.contact.models import DEFAULT_MODEL, MODELS, REFERENCE_MODEL
+from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
 from icha.datasets.labels import coarse_study, inputs_study, is_derived_study, number_label
 from icha.path.targets import ESTIMATED_AT_TARGETS, ESTIMATED_OF_LOOPS
-from icha.support.values import LONGEST_LABEL, NOTHING, ROUNDING, Problem, list_names, rule_of
+from icha.support.values import LONGEST_LABEL, NOTHING, Problem, list_names, rule_of
 
 MAX_RUNS = 100_000
 # Largest number of targets of all runs together.
@@ -277,14 +277,9 @@ def _level_problems(campaign, label, study, surfaces):
     for name in dict.fromkeys(surfaces):
         if name not in campaign.surfaces:
             continue
-        surface, least = campaign.surfaces[name], 2 * MODELS[REFERENCE_MODEL].least_cells
-        if not surface.random:
+        if not campaign.surfaces[name].random:
             reason = f"the key needs random surfaces, but {name!r} has no seeds; expected only random surfaces"
             yield location, NOTHING, reason
-        elif study.seeds_of_levels.coarse and surface.cells_per_short_wave < least * (1 - ROUNDING):
-            reason = f"gives {surface.cells_per_short_wave:.3g} cells per shortest wavelength, but `{given}` of study "
-            reason += f"{label!r} needs {least}, because a level has half the grid; expected "
-            yield ("surfaces", name, "grid"), surface.grid, f"{reason}{surface.grid_of_cells(least)} or more"
     quantity = study.accuracy and study.accuracy.quantity
     if quantity in ESTIMATED_OF_LOOPS and not study.unload:
         yield (*location, "quantity"), quantity, "is a quantity of a loop; expected `unload: true` in this study"

@@ -16,6 +16,9 @@ from icha.configuration.design import expand_design
 from icha.configuration.errors import ConfigurationError, format_problem, problem_of, refuse
 from icha.configuration.plausibility import (
     CONFIRMED,
+    coarse_contacts,
+    coarse_grids,
+    long_ranges,
     plausibility_problems,
     sticky_runs,
     unusual_heights,
@@ -99,6 +102,7 @@ def _load(path: Path, origin: str, written: Mapping, within: str | os.PathLike |
         location = "surfaces", campaign.origin("surfaces", name)
         unusual += unusual_topography(location, campaign.surfaces[name], each.period, each.rms_slope)
     unusual += unusual_heights(campaign)
+    unusual += coarse_grids(campaign)
     sticky = list(sticky_runs(campaign))
     if too_sticky := [each for each in sticky if _chooses_levels(campaign.studies[each.location[1]])]:
         levels = {each.location[1]: {"levels": _WITHOUT_ASPERITIES} for each in too_sticky}
@@ -111,15 +115,16 @@ def _load(path: Path, origin: str, written: Mapping, within: str | os.PathLike |
             for each in too_sticky
         ]
         return replace(found, warnings=(*notes, *found.warnings))
-    # Other unusual values are reported first, because they may cause the low U_full/dgamma.
-    implausible = list(plausibility_problems(unusual, confirmed)) or plausibility_problems(sticky, confirmed)
-    unusual += sticky
+    # Other unusual values are reported first, because they may cause the others.
+    caused = [*sticky, *coarse_contacts(campaign), *long_ranges(campaign)]
+    implausible = list(plausibility_problems(unusual, confirmed)) or plausibility_problems(caused, confirmed)
+    unusual += caused
     refuse(origin, itertools.chain(implausible, _located(campaign.problems(), written)))
     reason = "is unusual{}, but confirmed; expected {}"
     accepted = [
         format_problem(origin, each.location, each.value, reason.format(each.source, each.usual)) for each in unusual
     ]
-    return Configuration(campaign, text, str(path), (*campaign.warnings(), *accepted))
+    return Configuration(campaign, text, str(path), tuple(accepted))
 
 
 def _chooses_levels(study: Study) -> bool:

@@ -9,14 +9,18 @@ from collections.abc import Collection, Iterator, Mapping
 from typing import Any, NamedTuple
 
 from icha.asperity.full_contact import FULL_CONTACT_BELOW, full_contact_energy_ratio
-from icha.configuration.campaign import Campaign
+from icha.asperity.material import Material
+from icha.asperity.tabor import LEAST_TABOR, describe_short_range
+from icha.configuration.campaign import Campaign, Contact
 from icha.configuration.surfaces import SelfAffineSurface
-from icha.contact.models import DEFAULT_MODEL
-from icha.datasets.labels import is_derived_study
+from icha.contact.models import DEFAULT_MODEL, MODELS
+from icha.datasets.labels import coarse_study, is_derived_study
+from icha.path.targets import QUANTITIES, UNITS
 from icha.support import formatting
 from icha.support.usual import RMS_SLOPE, SIDE, USUAL, Usual
 from icha.support.values import Problem, to_number, to_si
-from icha.surfaces.moments import self_affine_full_contact_energy
+from icha.surfaces.moments import self_affine_full_contact_energy, self_affine_moments
+from icha.surfaces.resolution import LEAST_CELLS, RECOMMENDED_CELLS, Resolution
 
 CONFIRMED = "confirmed"
 # Sections whose keys are checked.
@@ -29,12 +33,13 @@ class Unusual(NamedTuple):
     Attributes
     ----------
     location : keys that lead to the value in the configuration.
+    usual : usual range, or a text that states what is expected.
     source : origin of a value that is not in the configuration, as text with a blank in front; otherwise empty.
     """
 
     location: tuple
     value: Any
-    usual: Usual
+    usual: Usual | str
     source: str = ""
 
     @property
@@ -104,6 +109,99 @@ def unusual_heights(campaign: Campaign) -> Iterator[Unusual]:
                 source = f" on {contact.surface}, where the rms slope is {contact.rms_slope:.3g}"
                 yield Unusual(("studies", name, "rms_heights"), heights, RMS_SLOPE, source)
                 break
+
+
+def coarse_grids(campaign: Campaign) -> Iterator[Unusual]:
+    """Yield the grid of each surface whose shortest wave has too few cells, the coarsest grid of its variants."""
+    found: dict[str, tuple[float, Unusual]] = {}
+    levels = [coarse for label in campaign.studies if (coarse := coarse_study(label)) in campaign.studies]
+    halves = {contact.surface for label in levels for contact in campaign.contacts(label)}
+    for name in dict.fromkeys(each.surface for study in campaign.studies for each in campaign.contacts(study)):
+        resolution = campaign.resolution(name)
+        origin, section, grid = campaign.origin("surfaces", name), campaign.surfaces[name], campaign.grid(name)
+        if resolution.reaches(LEAST_CELLS) or found.get(origin, (math.inf,))[0] <= resolution.cells:
+            continue
+        key = "grid" if hasattr(section, "grid") else "path"
+        expected = resolution.grids(2 * grid if name in halves else grid)
+        expected = expected if key == "grid" else f"a file with {expected}"
+        if hasattr(section, "cutoff"):
+            filtered = formatting.length(float(f"{RECOMMENDED_CELLS * campaign.period(name) / grid:.2g}"))
+            expected += f", or `cutoff: {filtered}`" if section.cutoff is None else ", or a longer `cutoff`"
+        reason = " on half the grid" if name in halves else f" of variant {name}" if origin != name else ""
+        source = f" ({resolution}{reason})"
+        value = getattr(campaign.surfaces[origin], key) or grid
+        found[origin] = resolution.cells, Unusual(("surfaces", origin, key), value, expected, source)
+    yield from (unusual for _, unusual in found.values())
+
+
+def coarse_contacts(campaign: Campaign) -> Iterator[Unusual]:
+    """For each study, yield the smallest target if there the contact of a smooth shape has too few cells."""
+    for name, study in campaign.studies.items():
+        if is_derived_study(name, campaign.studies):
+            continue
+        for contact in smooth_contacts(campaign, name):
+            resolution = resolution_of_smooth(campaign, name, contact)
+            if not resolution.reaches(LEAST_CELLS):
+                kind, value = study.targets.states[0]
+                source = f" ({resolution} for {contact.material} on {contact.surface})"
+                shown = formatting.format_quantity(value, UNITS[kind]) if kind in UNITS else value
+                expected = f"larger targets, or {resolution.grids(campaign.grid(contact.surface))}"
+                yield Unusual(("studies", name, "targets", QUANTITIES[kind].plural), shown, expected, source)
+                break
+
+
+def smooth_contacts(campaign: Campaign, study: str) -> list[Contact]:
+    """Return the contacts of smooth shapes that a study computes with boundary elements."""
+    contacts = [contact for model, contact in campaign.runs(study) if MODELS[model].by_cells]
+    return [contact for contact in contacts if campaign.surfaces[contact.surface].smooth]
+
+
+def resolution_of_smooth(campaign: Campaign, study: str, contact: Contact) -> Resolution:
+    """Return the number of cells in the smallest contact radius of a smooth shape at the targets of a study."""
+    from icha.references.limits import contact_resolution  # imports SciPy, which takes time
+
+    section = campaign.surfaces[contact.surface]
+    material = Material(**campaign.materials[contact.material].model_dump(exclude_none=True))
+    targets = campaign.studies[study].targets.states
+    return contact_resolution(section.shape.shape, section.side, section.grid, material, targets)
+
+
+def long_ranges(campaign: Campaign) -> Iterator[Unusual]:
+    """For each material, yield the range of attraction if a short range is a bad assumption for boundary elements."""
+    found: dict[str, tuple[float, Unusual]] = {}
+    for name in campaign.studies:
+        of_cells = [contact for model, contact in campaign.runs(name) if MODELS[model].by_cells]
+        for contact in {contact._replace(seed=0): contact for contact in of_cells}.values():
+            value = tabor_parameter(campaign, contact)
+            origin = campaign.origin("materials", contact.material)
+            if value is None or value >= min(LEAST_TABOR, found.get(origin, (math.inf,))[0]):
+                continue
+            reach = formatting.length(campaign.materials[contact.material].interaction_range)
+            source = f" for boundary elements of {contact.material} on {contact.surface}, which assume a short range; "
+            source += describe_short_range(value)
+            expected = f"a Tabor parameter of at least {LEAST_TABOR:g}"
+            found[origin] = value, Unusual(("materials", origin, "interaction_range"), reach, expected, source)
+    yield from (unusual for _, unusual in found.values())
+
+
+def tabor_parameter(campaign: Campaign, contact: Contact) -> float | None:
+    """Return the Tabor parameter of a contact, as in the file of its run; None without adhesion or without a radius.
+
+    The radius is 1/(rms curvature) of the roughness; without roughness, it is the radius of the shape.
+    """
+    section = campaign.surfaces[contact.surface]
+    material = Material(**campaign.materials[contact.material].model_dump(exclude_none=True))
+    radius = section.shape.shape.sphere_radius if section.smooth else 1 / rms_curvature(campaign, contact)
+    return float(material.tabor_parameter(radius)) if material.surface_energy and radius else None
+
+
+def rms_curvature(campaign: Campaign, contact: Contact) -> float:
+    """Return the rms curvature of profiles of a rough surface at the rms slope of a contact, 1/m."""
+    section = campaign.surfaces[contact.surface]
+    if isinstance(section, SelfAffineSurface):
+        moments = self_affine_moments(*section.lengths_and_hurst)
+        return math.sqrt(moments.m4 / (2 * moments.m2)) * contact.rms_slope
+    return campaign.topography(contact.surface).rms_curvature * contact.rms_slope
 
 
 _TOO_STICKY = f"{FULL_CONTACT_BELOW:g} to inf (for smaller values full contact has a lower energy than separated "

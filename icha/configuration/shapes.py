@@ -7,6 +7,7 @@ from pydantic import Field, model_validator
 
 from icha.support import formatting
 from icha.support.values import Length, Section, exactly_one, quantity
+from icha.surfaces.resolution import NYQUIST_CELLS, Resolution
 from icha.surfaces.shapes import AMPLITUDE, HALF_ANGLE, Shape, make_shape
 
 # Distance between the apex and the nearest node, in cells along x and y, is less than this number.
@@ -92,4 +93,8 @@ class ShapeSection(Section):
         if not np.isfinite(shape.heights(near, near)):
             cell = formatting.length(side / grid, 3)
             return f"shape: is smaller than a grid cell of {cell}; expected a larger shape or a finer grid"
+        resolution = Resolution(shape.shortest_wave * grid / side)
+        if not resolution.representable:
+            reason = f"shape: has {resolution}, but at least {NYQUIST_CELLS} are needed"
+            return f"{reason}; expected a longer wave, or {resolution.grids(grid)}"
         return None

@@ -1,6 +1,5 @@
 """Sections `surfaces` and `materials`: rough surfaces, and elastic half-spaces or layers."""
 
-import math
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -34,6 +33,7 @@ from icha.support.values import (
     quantity,
     to_si,
 )
+from icha.surfaces.resolution import NYQUIST_CELLS, Resolution
 
 # Word for a body that does not deform.
 RIGID = "rigid"
@@ -251,8 +251,6 @@ class _Surface(Section):
 
 class _SurfaceFromFile(_Surface):
     from_file: ClassVar[bool] = True
-    # The shortest wavelength of a surface from a file is unknown.
-    cells_per_short_wave: ClassVar[float] = math.inf
 
 
 class MeasuredSurface(_SurfaceFromFile):
@@ -369,7 +367,7 @@ class SelfAffineSurface(_Surface):
     """Roll-off wavelength 2π/q0, at most the period. At longer wavelengths the spectrum is constant."""
     short_wavelength: Length
     """Shortest wavelength 2π/q1. This wavelength must be less than the roll-off wavelength and at least 2 grid
-    cells. Less than 4 grid cells cause a warning; 8 grid cells are recommended."""
+    cells. Less than 4 grid cells must be confirmed; 8 grid cells are recommended."""
     hurst: number(HURST)
     """Hurst exponent H, in (0, 1]."""
     grid: integer(GRID)
@@ -397,15 +395,6 @@ class SelfAffineSurface(_Surface):
 
         return SelfAffineSpectrum(*self.lengths_and_hurst).rms_height
 
-    @property
-    def cells_per_short_wave(self) -> float:
-        """Number of grid cells per shortest wavelength."""
-        return self.grid * self.short_wavelength / self.period
-
-    def grid_of_cells(self, cells: int) -> int:
-        """Return the smallest grid that has `cells` cells per shortest wavelength."""
-        return math.ceil(cells * self.period / self.short_wavelength * (1 - ROUNDING))
-
     @field_validator("rolloff_wavelength", "short_wavelength", "grid")
     @classmethod
     def _check_wavelengths(cls, value, info):
@@ -418,12 +407,11 @@ class SelfAffineSurface(_Surface):
             if rolloff is not None and value >= rolloff * (1 - ROUNDING):
                 reason = "is not shorter than the roll-off wavelength"
                 raise ValueError(f"{reason}; expected less than {formatting.length(rolloff)}")
-        elif None not in (period, short) and value * short / period < 2 * (1 - ROUNDING):
-            least = math.ceil(2 * period / short * (1 - ROUNDING))
-            raise ValueError(
-                f"gives {value * short / period:.3g} grid cells per shortest wavelength, but at least 2 are needed; "
-                f"expected at least {least}, better {2 * least} or more"
-            )
+        elif None not in (period, short):
+            resolution = Resolution(value * short / period)
+            if not resolution.representable:
+                reason = f"gives {resolution}, but at least {NYQUIST_CELLS} are needed"
+                raise ValueError(f"{reason}; expected {resolution.grids(value)}")
         return value
 
 
@@ -458,8 +446,8 @@ class SpectrumSurface(_SurfaceFromFile):
     period: Length
     """Side L of the periodic cell. Waves longer than the cell are left out."""
     grid: integer(GRID)
-    """Number of nodes along a side of the periodic cell. The shortest wave of the table needs at least 2 cells; 8 are
-    recommended."""
+    """Number of nodes along a side of the periodic cell. The shortest wave of the table needs at least 2 cells; less
+    than 4 cells must be confirmed; 8 cells are recommended."""
     amplitudes: Literal["fixed", "gaussian"] = "fixed"
     """Amplitudes of the waves, as for `kind: self_affine`."""
     boundary: Literal["periodic", "free"] = _BOUNDARY
@@ -475,7 +463,6 @@ class SmoothSurface(_Surface):
     """A shape alone, without roughness. A study uses it once, without seeds and rms slopes."""
 
     smooth: ClassVar[bool] = True
-    cells_per_short_wave: ClassVar[float] = math.inf
     boundary: ClassVar[str] = "free"
 
     kind: Literal["smooth"]
@@ -485,7 +472,8 @@ class SmoothSurface(_Surface):
     side: Length
     """Side of the square. Contact must not reach its edges."""
     grid: integer(GRID)
-    """Number of nodes along the side of the square. A contact radius of at least 8 cells is recommended."""
+    """Number of nodes along the side of the square. At every target, a contact radius of less than 4 cells must be
+    confirmed; 8 cells are recommended."""
 
     @property
     def period(self) -> float:

@@ -55,6 +55,8 @@ def inspect_file(section: MeasuredSurface | FileSurface | SpectrumSurface) -> To
         version = None
     key = section.path, section.model_dump_json(), version
     if key not in _KNOWN:
+        from icha.surfaces.resolution import shortest_wave
+
         surface = read_surface(section)
         slope = surface.rms_slope
         _KNOWN[key] = Topography(
@@ -66,6 +68,8 @@ def inspect_file(section: MeasuredSurface | FileSurface | SpectrumSurface) -> To
             surface.full_contact_energy / slope**2,
             surface.complete_contact_pressure / slope,
             surface.rms_height / slope,
+            surface.rms_curvature / slope,
+            shortest_wave(surface),
         )
     return _KNOWN[key]
 
@@ -90,7 +94,7 @@ def read_surface(section: MeasuredSurface | FileSurface | SpectrumSurface, seed:
 
         spectrum = read_spectrum_table(section.path, section.length_unit).in_cell(section.period)
         surface = spectrum.realise(section.grid, seed, section.amplitudes)
-        return _with_shape(Surface(surface.heights, section.period, "free") if section.free else surface, section)
+        return _with_shape(replace(surface, boundary="free") if section.free else surface, section)
     from icha.surfaces.measured.scan import read_height_map
 
     surface = Surface(

@@ -89,7 +89,6 @@ class Model:
     stiffness_error : largest relative error of the contact stiffness.
     by_summits : whether summits represent the surface. If so, spots unite by a rule, which may lose or gain energy.
     by_cells : whether contact is counted in cells of the grid; runs then contain a map of the contact.
-    least_cells : smallest valid number of grid cells per shortest wavelength; 0 for no limit.
     accuracy : accuracy with which a path resolves its events.
     resumable : whether a run saves checkpoints; if so, `module` contains a function `resumable(contact, folder)`.
     """
@@ -104,7 +103,6 @@ class Model:
     stiffness_error: float = 1e-6
     by_summits: bool = False
     by_cells: bool = False
-    least_cells: int = 0
     accuracy: PathAccuracy = PathAccuracy()
     resumable: bool = False
 
@@ -174,7 +172,6 @@ MODELS = {
         },
         stiffness_error=1e-4,
         by_cells=True,
-        least_cells=4,
         # Fronts that hop from cell to cell lose energy that only a finer grid would resolve.
         accuracy=PathAccuracy(target=1e-6, event=1e-5, loss=1e-4, tension=1e-5, error_controlled_steps=True),
         resumable=True,

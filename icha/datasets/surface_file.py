@@ -57,7 +57,9 @@ def write_surface(
         "power_spectrum": power,
     }
     if spectrum is not None:
-        values |= get_values(spectrum, "rolloff_wavelength", "short_wavelength", "hurst")
+        values |= get_values(spectrum, "rolloff_wavelength", "hurst")
+    if surface.short_wavelength is not None:
+        values["short_wavelength"] = surface.short_wavelength
     if measured is not None:
         values["measured_rms_slope"] = measured.surface.rms_slope
     kind, origin = "Self-affine surface" if spectrum is not None else "Surface from a file", {}
@@ -107,7 +109,9 @@ def read_surface(path: str | os.PathLike) -> Surface:
     try:
         heights = dataset["height"].transpose("y", "x").values
         shape = make_shape(json.loads(dataset.attrs["shape"])) if "shape" in dataset.attrs else None
-        return Surface(heights, float(dataset["period"]), dataset.attrs.get("boundary", PERIODIC), shape)
+        shortest = float(dataset["short_wavelength"]) if "short_wavelength" in dataset else None
+        boundary = dataset.attrs.get("boundary", PERIODIC)
+        return Surface(heights, float(dataset["period"]), boundary, shape, shortest)
     except (TypeError, ValueError) as error:
         raise ValueError(f"{path}: {error}") from None
 

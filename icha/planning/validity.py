@@ -11,6 +11,7 @@ from icha.analysis.validity import (
     SPACING,
     STICKY_HEIGHT,
     STRENGTH,
+    TABOR,
     THEORETICAL,
     Case,
     Statement,
@@ -21,10 +22,11 @@ from icha.analysis.validity import (
 from icha.asperity.full_contact import gaussian_complete_pressure
 from icha.asperity.material import VAN_DER_WAALS_RANGE, WU_HOLDS_FROM, Material
 from icha.asperity.stickiness import stickiness, sticky_rms_height
+from icha.asperity.tabor import describe_short_range
 from icha.boundary_elements.front import Front
 from icha.configuration.campaign import Campaign
 from icha.configuration.cases import run_cases
-from icha.configuration.plausibility import energy_ratio
+from icha.configuration.plausibility import energy_ratio, resolution_of_smooth, rms_curvature, tabor_parameter
 from icha.configuration.surfaces import SelfAffineSurface
 from icha.configuration.topographies import read_surface
 from icha.contact.models import MODELS
@@ -32,9 +34,8 @@ from icha.datasets.labels import is_derived_study
 from icha.support.formatting import format_quantity
 from icha.surfaces.moments import (
     SpectralMoments,
-    cells_per_short_wave,
     height_statistics,
-    self_affine_integral,
+    self_affine_moments,
     slope_anisotropy,
     spectral_moments,
     summit_density,
@@ -50,18 +51,6 @@ _SUMMIT_RADIUS = 3 * math.sqrt(math.pi) / 8
 _SMALLEST_TABOR = 0.84
 
 
-def self_affine_moments(
-    period: float, rolloff_wavelength: float, short_wavelength: float, hurst: float
-) -> SpectralMoments:
-    """Return the spectral moments of a self-affine surface with roll-off, up to a common factor; lengths in m.
-
-    The moments are integrals over the plane of wave vectors: m0 = int C, m2 = 1/2 int q^2 C, m4 = 3/8 int q^4 C.
-    """
-    q_l, q_0, q_1 = (2 * math.pi / length for length in (period, rolloff_wavelength, short_wavelength))
-    m0, m2, m4 = (self_affine_integral(order, q_l, q_1, q_0, hurst) for order in (1, 3, 5))
-    return SpectralMoments(m0, m2 / 2, 3 / 8 * m4)
-
-
 def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
     """Return, by name, those properties of a surface at rms slope 1 that decide whether the contact models are valid.
 
@@ -70,13 +59,13 @@ def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
 
     Returns
     -------
-    The properties in `icha.analysis.validity.VALIDATED`, and four others. `summits` is the number of summits that the
-    asperity model uses. `rms_curvature` is the rms curvature of profiles, 1/m. `rms_height` is the rms height, m.
-    `complete_contact_pressure` is the pressure of complete contact, divided by E*; it is estimated for random surfaces.
+    The properties in `icha.analysis.validity.VALIDATED`, and three others. `summits` is the number of summits that the
+    asperity model uses. `rms_height` is the rms height, m. `complete_contact_pressure` is the pressure of complete
+    contact, divided by E*; it is estimated for random surfaces.
     """
     section = campaign.surfaces[name]
     if isinstance(section, SelfAffineSurface):
-        moments, grid, unsupported = self_affine_moments(*section.lengths_and_hurst), section.grid, 0
+        moments, unsupported = self_affine_moments(*section.lengths_and_hurst), 0
         summits = section.period**2 * summit_density(moments.m2, moments.m4)
         complete = gaussian_complete_pressure(section.period / section.short_wavelength)
         skewness, kurtosis, anisotropy, free = 0.0, 3.0, 1.0, section.free
@@ -85,7 +74,7 @@ def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
 
         surface = read_surface(section)
         moments, (skewness, kurtosis) = spectral_moments(surface), height_statistics(surface)
-        anisotropy, free, grid = slope_anisotropy(surface), surface.free, surface.grid
+        anisotropy, free = slope_anisotropy(surface), surface.free
         found = locate_summits(surface)
         summits, unsupported = len(found), len(found.unsupported_height)
         complete = campaign.topography(name).complete_contact_pressure
@@ -95,11 +84,10 @@ def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
         "height_skewness": skewness,
         "height_kurtosis": kurtosis,
         "nayak_parameter": moments.nayak_parameter,
-        "nodes_per_short_wave": cells_per_short_wave(grid, every),
+        "nodes_per_short_wave": campaign.resolution(name).cells,
         "unsupported_summits": unsupported / max(every, 1),
         "free_edges": float(free),
         "summits": summits,
-        "rms_curvature": math.sqrt(moments.m4 / (2 * moments.m2)),
         RMS_HEIGHT: math.sqrt(moments.m0 / (2 * moments.m2)),
         COMPLETE: complete,
     }
@@ -110,8 +98,15 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
     facts_of = cache(lambda surface: surface_facts(campaign, surface))
     cases, tabor, sticky = [], {}, {}
     for case in run_cases(campaign):
-        if campaign.surfaces[case.surface].smooth or is_derived_study(case.study, campaign.studies):
-            continue  # a single contact, or runs whose error the estimates correct
+        if is_derived_study(case.study, campaign.studies):
+            continue  # runs whose error the estimates correct
+        value = tabor_parameter(campaign, case)
+        range_of_attraction = {} if value is None else {TABOR: value}
+        if campaign.surfaces[case.surface].smooth:
+            resolution = min(resolution_of_smooth(campaign, case.study, case), campaign.resolution(case.surface))
+            known = {"full_contact_energy_ratio": math.inf} | range_of_attraction
+            cases.append(Case(case.model, case.surface, case.material, known, resolution))
+            continue
         facts, by_summits = facts_of(case.surface), MODELS[case.model].by_summits
         material = Material(**campaign.materials[case.material].model_dump(exclude_none=True))
         # Only the asperity model needs surfaces that are similar to the surfaces of its validation.
@@ -121,6 +116,7 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
             COMPLETE: facts[COMPLETE] * case.rms_slope * material.contact_modulus,
             STRENGTH: material.interface_strength,
             THEORETICAL: material.theoretical_strength,
+            **range_of_attraction,
         }
         section = campaign.surfaces[case.surface]
         if isinstance(section, SelfAffineSurface):
@@ -133,11 +129,11 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
             spacing = campaign.period(case.surface) / campaign.grid(case.surface)
             tension = Front(material.adhesion_length / spacing).straight_strength * material.contact_modulus
             known |= {RESOLVED: tension, SPACING: spacing}
-        cases.append(Case(case.model, case.surface, case.material, known))
+        cases.append(Case(case.model, case.surface, case.material, known, campaign.resolution(case.surface)))
         if by_summits and material.surface_energy > 0:
-            curvature = facts["rms_curvature"] * case.rms_slope
-            tabor_parameter = float(material.tabor_parameter(_SUMMIT_RADIUS / curvature))
-            tabor.setdefault((case.material, case.surface), []).append(tabor_parameter)
+            curvature = rms_curvature(campaign, case)
+            of_summit = float(material.tabor_parameter(_SUMMIT_RADIUS / curvature))
+            tabor.setdefault((case.material, case.surface), []).append(of_summit)
             value = stickiness(SpectralMoments(0.0, case.rms_slope**2 / 2, curvature**2), material)
             key = case.surface, case.material
             sticky[key] = max(value, sticky.get(key, 0.0))
@@ -182,12 +178,15 @@ def _indenters(campaign):
         force = 1.5 * math.pi * material.surface_energy * radius
         contact = math.cbrt(4.5 * math.pi * material.surface_energy * radius**2 / material.contact_modulus)
         cell = campaign.period(surface) / campaign.grid(surface)
+        tabor = math.cbrt((material.surface_energy / material.contact_modulus) ** 2 * radius)
+        long_range = describe_short_range(tabor / material.interaction_range)
         text = (
             f"by the theory of JKR, {name} adheres to a smooth sphere of radius {format_quantity(radius, 'm')} with a "
             f"pull-off force of {format_quantity(force, 'N')}; at zero load the contact radius is "
             f"{format_quantity(contact, 'm')} ({contact / cell:.2g} cells of {surface})"
+            f"{f'. JKR does not hold: {long_range}' if long_range else ''}"
         )
-        yield Statement("indenter", text, contact >= _LEAST_CELLS * cell)
+        yield Statement("indenter", text, contact >= _LEAST_CELLS * cell and not long_range)
 
 
 def _describe_outside(tabor):

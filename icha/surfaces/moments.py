@@ -17,35 +17,10 @@ if TYPE_CHECKING:
     from icha.surfaces.surface import Surface
 
 
-# A grid resolves the summits of a wave if the wave has at least this number of cells.
-RESOLVED_CELLS = 8
-# Number of cells per summit on a surface with RESOLVED_CELLS / 2 cells per shortest wave. Isotropic surfaces have about
-# 0.2 summits in a square with the side of the shortest wavelength.
-LEAST_CELLS_OF_SUMMIT = 80
-# Boundary elements represent a surface only if its shortest wave has at least this number of cells.
-LEAST_CELLS_PER_WAVE = 1.5
 # The smaller of two mean square slopes is a rounding error if it is at most this fraction of the larger one.
 _NO_SLOPE = 1e-12
 # Waves up to this wave number, in units of 2 pi/L, are summed. An integral replaces the sum over shorter waves.
 _DENSE = 64
-
-
-def cells_per_short_wave(grid: int, summits: float) -> float:
-    """Estimate the number of nodes per shortest wavelength from the nodes along a side and the number of summits."""
-    return RESOLVED_CELLS / 2 * math.sqrt(grid**2 / max(summits, 1) / LEAST_CELLS_OF_SUMMIT)
-
-
-def error_of_cells(cells_per_short_wave: float) -> str:
-    """Describe the error of the contact area that boundary elements compute on a coarse grid; "" if it is small.
-
-    Contact areas of random surfaces at p* = 1e-3 and 1e-2 were compared with areas on grids four times as fine. The
-    largest errors were 93 % with 1.1 cells per shortest wave (white noise), 23 % with 2, 15 % with 3, 11 % with 5.
-    """
-    if cells_per_short_wave >= 0.9 * RESOLVED_CELLS:  # estimates from summits have an error of 10 %
-        return ""
-    if cells_per_short_wave >= 4:
-        return "a few per cent"
-    return "up to a quarter" if cells_per_short_wave >= LEAST_CELLS_PER_WAVE else "up to a factor of two"
 
 
 def summit_density(m2: float, m4: float) -> float:
@@ -120,6 +95,18 @@ class SpectralMoments(NamedTuple):
         """Return the moments for heights that are scaled so that the rms slope is `rms_slope`."""
         factor = (rms_slope / self.rms_slope) ** 2
         return SpectralMoments(*(moment * factor for moment in self))
+
+
+def self_affine_moments(
+    period: float, rolloff_wavelength: float, short_wavelength: float, hurst: float
+) -> SpectralMoments:
+    """Return the spectral moments of a self-affine surface with roll-off, up to a common factor; lengths in m.
+
+    The moments are integrals over the plane of wave vectors: m0 = int C, m2 = 1/2 int q^2 C, m4 = 3/8 int q^4 C.
+    """
+    q_l, q_0, q_1 = (2 * math.pi / length for length in (period, rolloff_wavelength, short_wavelength))
+    m0, m2, m4 = (self_affine_integral(order, q_l, q_1, q_0, hurst) for order in (1, 3, 5))
+    return SpectralMoments(m0, m2 / 2, 3 / 8 * m4)
 
 
 def spectral_moments(surface: Surface) -> SpectralMoments:

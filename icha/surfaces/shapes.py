@@ -43,6 +43,16 @@ class Shape(ABC):
         """None, because the apex is not that of a sphere."""
         return None
 
+    @property
+    def end_radius(self) -> float | None:
+        """Radius of the largest circle on the flat end, m; None without a flat end."""
+        return None
+
+    @property
+    def shortest_wave(self) -> float:
+        """Wavelength of the waves of the shape, m; infinite, because the shape has no waves."""
+        return math.inf
+
 
 @dataclass(frozen=True)
 class Sphere(Shape):
@@ -105,6 +115,11 @@ class CylinderPunch(Shape):
         """Return 0 on the end and -inf outside."""
         return np.where(np.hypot(x, y) <= self.radius, 0.0, -np.inf)
 
+    @property
+    def end_radius(self):
+        """Radius of the end, m."""
+        return self.radius
+
 
 @dataclass(frozen=True)
 class FlatPunch(Shape):
@@ -116,6 +131,11 @@ class FlatPunch(Shape):
     def heights(self, x, y):
         """Return 0 on the end and -inf outside."""
         return np.where(np.maximum(np.abs(x), np.abs(y)) <= self.side / 2, 0.0, -np.inf)
+
+    @property
+    def end_radius(self):
+        """Half the side of the end, m."""
+        return self.side / 2
 
 
 @dataclass(frozen=True)
@@ -166,6 +186,11 @@ class Wave(Shape):
     def sphere_radius(self):
         """Radius R of the paraboloid without waves, m."""
         return self.radius
+
+    @property
+    def shortest_wave(self):
+        """Wavelength of the waves, m; infinite without amplitude."""
+        return self.wavelength if self.amplitude else math.inf
 
 
 def describe_shape(shape: Shape) -> str:

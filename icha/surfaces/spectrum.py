@@ -16,6 +16,7 @@ import scipy.fft
 
 from icha.support.parallel import blocks, on_cores
 from icha.support.rules import GRID, HURST, LENGTH, SEED, SLOPE
+from icha.surfaces.resolution import LEAST_CELLS, NYQUIST_CELLS, Resolution
 from icha.surfaces.surface import Surface
 
 # Relative rounding error of wave numbers. With this tolerance, a band that ends at L/lambda_s = 64 excludes |k| = 64.
@@ -94,17 +95,12 @@ class IsotropicSpectrum:
         seed = SEED.validate("seed", seed)
         if amplitudes not in ("fixed", "gaussian"):
             raise ValueError(f"amplitudes: {amplitudes!r} must be one of fixed, gaussian")
-        cells = grid * self.short_wavelength / self.period
-        if cells < 2 * (1 - _ROUNDING):
-            raise ValueError(
-                f"grid: {grid} nodes give {cells:.3g} cells per shortest wavelength; expected at least "
-                f"{math.ceil(2 * self.period / self.short_wavelength * (1 - _ROUNDING))} nodes"
-            )
-        if cells < 4 * (1 - _ROUNDING):
-            warnings.warn(
-                f"grid: {grid} nodes give {cells:.3g} cells per shortest wavelength; expected at least 4, better 8",
-                stacklevel=2,
-            )
+        resolution = Resolution(grid * self.short_wavelength / self.period)
+        if not resolution.representable:
+            least = resolution.grid_of(grid, NYQUIST_CELLS)
+            raise ValueError(f"grid: {grid} nodes give {resolution}; expected at least {least} nodes")
+        if not resolution.reaches(LEAST_CELLS):
+            warnings.warn(f"grid: {grid} nodes give {resolution}; expected {resolution.grids(grid)}", stacklevel=2)
         kx, ky, k, inside = self._band
         random = np.random.Generator(np.random.PCG64(seed)).random((inside.size, 2))[inside]
         size = np.sqrt(self.plateau * self._shape(k)) * (2 * np.pi / self.period)
@@ -126,7 +122,7 @@ class IsotropicSpectrum:
 
         on_cores(along_y, blocks(half.shape[1], _LINES))
         on_cores(along_x, blocks(grid, _LINES))
-        return Surface(heights, self.period)
+        return Surface(heights, self.period, short_wavelength=self.short_wavelength)
 
 
 @dataclass(frozen=True)

@@ -67,6 +67,7 @@ class Surface:
     boundary : "periodic" (in both directions), or "free" (a single square; the half-space is larger than the square).
     shape : smooth shape that carries the roughness, such as `icha.Sphere`, with its apex in the middle of the square;
         only with the boundary "free". The roughness may then be zero.
+    short_wavelength : shortest wavelength of the roughness, m, in [1e-24, 1e9]; None if it is unknown.
 
     Warns
     -----
@@ -86,6 +87,7 @@ class Surface:
     period: float
     boundary: str = PERIODIC
     shape: Shape | None = None
+    short_wavelength: float | None = None
 
     def __post_init__(self):
         """Check the arguments, remove the mean height, and make the heights read-only."""
@@ -101,6 +103,9 @@ class Surface:
         if problem := problem_with_heights(heights, smooth=self.shape is not None):
             raise ValueError(f"heights: {problem}")
         object.__setattr__(self, "period", LENGTH.validate("period", self.period))
+        if self.short_wavelength is not None:
+            wavelength = LENGTH.validate("short_wavelength", self.short_wavelength)
+            object.__setattr__(self, "short_wavelength", wavelength)
         if not self.smooth:
             with np.errstate(over="ignore"):
                 _STEEPNESS.validate("heights: their range over the period", np.ptp(heights) / self.period)
@@ -359,7 +364,7 @@ class Surface:
         heights = self.heights
         for axis in (0, 1):
             heights = resample(heights, factor * self.grid, axis=axis)
-        return Surface(heights, self.period)
+        return Surface(heights, self.period, short_wavelength=self.short_wavelength)
 
 
 def full_contact_pressure(

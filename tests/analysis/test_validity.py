@@ -20,7 +20,8 @@ from icha.analysis.validity import (
 from icha.configuration.load import load_configuration
 from icha.datasets.campaign import campaign_tree
 from icha.planning.validity import surface_facts
-from icha.surfaces.moments import cells_per_short_wave, height_statistics, slope_anisotropy, spectral_moments
+from icha.surfaces.moments import height_statistics, slope_anisotropy, spectral_moments
+from icha.surfaces.resolution import Resolution, resolution_of
 from icha.surfaces.summits import locate_summits
 
 
@@ -50,8 +51,8 @@ INSIDE = {
 BARE = {**INSIDE, "full_contact_energy_ratio": math.inf}
 
 
-def case(facts, surface="rough", model="asperities", material="soft"):
-    return Case(model, surface, material, facts)
+def case(facts, surface="rough", model="asperities", material="soft", cells=8.0):
+    return Case(model, surface, material, facts, Resolution(cells))
 
 
 def told(*arguments):
@@ -75,7 +76,7 @@ def test_each_kind_is_said_in_one_line():
     [
         ("slope_anisotropy", math.inf, "slopes inf, validated: 1 to 1.2"),
         ("height_skewness", -0.7, "heights -0.7, validated: -0.2 to 0.2"),
-        ("nodes_per_short_wave", 3.2, "wave 3.2, validated: 5.8 and more"),
+        ("nodes_per_short_wave", 3.2, "wave 3.2, validated: 6.9 and more"),
         ("free_edges", 1.0, "`boundary: window`"),
     ],
 )
@@ -121,7 +122,7 @@ def test_the_range_of_the_validation_is_that_of_its_surfaces():
                 "height_skewness": skewness,
                 "height_kurtosis": kurtosis,
                 "nayak_parameter": spectral_moments(surface).nayak_parameter,
-                "nodes_per_short_wave": cells_per_short_wave(section.grid, len(summits) + unsupported),
+                "nodes_per_short_wave": resolution_of(surface).cells,
                 "free_edges": 0,
                 "full_contact_energy_ratio": energy * material.contact_modulus / material.surface_energy,
             }
@@ -130,7 +131,8 @@ def test_the_range_of_the_validation_is_that_of_its_surfaces():
                 found[key].append(value)
     # Nothing much wider than what was validated, where there is an end.
     assert max(found["nayak_parameter"]) > 0.98 * VALIDATED["nayak_parameter"].most
-    assert min(found["nodes_per_short_wave"]) < 1.02 * VALIDATED["nodes_per_short_wave"].least
+    # An estimate for a measured surface may be 14 % too small.
+    assert 0.86 * min(found["nodes_per_short_wave"]) < 1.02 * VALIDATED["nodes_per_short_wave"].least
     assert min(found["full_contact_energy_ratio"]) < 1.02 * VALIDATED["full_contact_energy_ratio"].least
     assert max(map(abs, found["height_skewness"])) > 0.15
     assert min(found["height_kurtosis"]) < 2.4 and max(found["height_kurtosis"]) > 3.4
@@ -139,7 +141,7 @@ def test_the_range_of_the_validation_is_that_of_its_surfaces():
 def test_the_data_say_where_spots_lay_outside():
     found = {each.about: each for each in statements_on_dataset(small.tree())}
     assert found["models"].text == "asperities in slopes, single"
-    assert "nodes per shortest wave" in found["accuracy"].text and not found["accuracy"].good
+    assert "cells per shortest wave" in found["accuracy"].text and not found["accuracy"].good
     least = min(float(run["full_contact_energy_ratio"]) for _, run in small.runs())
     assert f"U_full/dgamma is about {least:.3g} or more (soft on rough)" in found["adhesion"].text
     assert found["jump-in"].good and found["jump-in"].text.endswith("; all runs are in this range")

@@ -52,6 +52,7 @@ def test_loads_of_boundary_elements_are_snapshots_of_the_runs(load):
 def test_ranges_are_held_against_the_grid_of_a_surface_file(load, tmp_path):
     np.save(tmp_path / "heights.npy", np.random.default_rng(1).normal(size=(16, 16)))
     changes = {"surfaces.rough": file_surface("heights.npy"), "finite_range": {"truth": TRUTH}}
+    changes["confirmed"] = ["surfaces.rough.path"]
     with pytest.raises(ConfigurationError, match=r"truth\.materials: 'soft' on .* spacing 6\.25e-05 m"):
         load(changes)
     assert len(solution_cases(load({**changes, "materials.soft.surface_energy": "0 J/m^2"}).campaign)) == 4

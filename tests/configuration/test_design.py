@@ -18,7 +18,8 @@ def paths(campaign):
 
 def test_random_surfaces_and_files_share_a_study(load, tmp_path):
     np.save(tmp_path / "own.npy", np.random.default_rng(1).random((16, 16)))
-    campaign = load({"surfaces.own": file_surface("own.npy"), "studies.one.surfaces": ["rough", "own"]}).campaign
+    changes = {"surfaces.own": file_surface("own.npy"), "studies.one.surfaces": ["rough", "own"]}
+    campaign = load(changes | {"confirmed": ["surfaces.own.path"]}).campaign
     assert surface_cases(campaign) == [("rough", 1), ("rough", 2), ("own", 0)]
     assert len(paths(campaign)) == 2 * 2 + 2
 
@@ -113,6 +114,7 @@ def test_rms_heights_scale_surfaces_as_their_spectra_or_their_files_demand(load,
     surface = SelfAffineSpectrum(100e-6, 20e-6, 10e-6, 0.5, rms_slope=slope).realise(80, 7)
     assert np.std(surface.heights) == pytest.approx(100e-9, rel=1e-6)
     changes |= {"surfaces.own": file_surface("own.npy"), "studies.one.surfaces": ["own"]}
+    changes["confirmed"] = ["surfaces.own.path"]
     del changes["studies.one.vary"]
     ((_, slope),) = slopes_of(load(changes).campaign)
     own = Surface((heights - heights.mean()) * 1e-6, 1e-3)

@@ -12,15 +12,6 @@ BOTH = {"studies.one.models": ["asperities", "boundary_elements"]}
 ALONE = {"studies.one.models": ["boundary_elements"]}
 
 
-def test_few_cells_are_warned_of_and_4_to_8_only_for_boundary_elements(load):
-    coarse = {"surfaces.rough.grid": 40}
-    assert load(coarse).campaign.warnings() == []
-    assert "surfaces.rough.grid: 30 gives 3 grid cells" in load({"surfaces.rough.grid": 30}).campaign.warnings()[0]
-    (warning,) = load(BOTH | coarse).campaign.warnings()
-    assert "surfaces.rough.grid: 40 gives 4 grid cells" in warning and "a grid of at least 80" in warning
-    assert load(BOTH).campaign.warnings() == []
-
-
 def test_without_the_key_runs_are_by_asperities_and_as_they_were(load):
     plain, both = load().campaign, load(BOTH).campaign
     assert {case.model for case in run_cases(plain)} == {"asperities"}

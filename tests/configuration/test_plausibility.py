@@ -14,8 +14,9 @@ UNUSUAL = {
     "studies.one.rms_slopes.0": [500, "6", 1e-5],
     "studies.one.rms_slopes.1": [500],
 }
-# Models to which it does not matter how sticky a contact is.
-ANY_STICKINESS = {"studies.one.models": ["boundary_elements"]}
+# Models to which it does not matter how sticky a contact is, and a confirmed Tabor parameter.
+RANGE = "materials.soft.interaction_range"
+ANY_STICKINESS = {"studies.one.models": ["boundary_elements"], "confirmed": [RANGE]}
 USUAL = {
     "materials.soft.contact_modulus": ["1 kPa", "1 TPa"],
     "materials.soft.surface_energy": ["0 J/m^2", "1e-6 J/m^2", "2 J/m^2"],
@@ -33,14 +34,14 @@ def test_unusual_values_are_refused_until_they_are_confirmed(place, value, load,
     key = key_of(place)
     refused(place, value, f": {value!r} is unusual; expected ")
     refused(place, value, f"Correct the value, or add `confirmed: [{key}]` at the top level if you intend this value")
-    configuration = load({**ANY_STICKINESS, place: value, "confirmed": [key]})
-    (warning,) = configuration.warnings
+    configuration = load({**ANY_STICKINESS, place: value, "confirmed": list({key, RANGE})})
+    (warning,) = (each for each in configuration.warnings if "Tabor parameter" not in each)
     assert warning.startswith(f"{tmp_path}/campaign.yaml: {key}") and f"{value!r} is unusual, but confirmed" in warning
 
 
 @pytest.mark.parametrize(("place", "value"), [(place, value) for place, all_ in USUAL.items() for value in all_])
 def test_what_is_usual_needs_no_confirmation(place, value, load):
-    assert load({**ANY_STICKINESS, place: value}).warnings == ()
+    assert not [each for each in load({**ANY_STICKINESS, place: value}).warnings if "Tabor parameter" not in each]
 
 
 def test_unusual_values_are_found_wherever_values_are_written(load, refused, tmp_path):
@@ -84,7 +85,7 @@ def test_sticky_runs_on_surfaces_from_files_are_found_too(load, refused, tmp_pat
     load(scan)
     refused("", scan | STICKY, "is unusual for soft on rough at rms slope 0.2; expected 1 to inf")
     np.save(tmp_path / "heights.npy", np.random.default_rng(1).normal(size=(16, 16)))
-    periodic = {"surfaces.rough": file_surface(tmp_path / "heights.npy")}
+    periodic = {"surfaces.rough": file_surface(tmp_path / "heights.npy"), "confirmed": ["surfaces.rough.path"]}
     load({**periodic, "materials.soft.surface_energy": "0 J/m^2"})
     refused("", {**periodic, "materials.soft.contact_modulus": "1 kPa"}, "studies.one.models: 'asperities with U_full")
 

@@ -19,7 +19,9 @@ def test_shipped_campaigns_are_valid(path):
     configuration = load_configuration(path)
     campaign = configuration.campaign
     assert run_cases(campaign)
-    assert not configuration.warnings and not campaign.confirmed
+    # What a campaign confirms is unusual; comments in its file give the reasons.
+    confirmed = [warning.removeprefix(f"{path}: ").split(": ")[0] for warning in configuration.warnings]
+    assert confirmed == campaign.confirmed
     assert path.name == "config.yaml" or campaign.name == path.stem
 
 
@@ -32,7 +34,7 @@ def test_the_papers_campaign():
         ("challenge", 1),
         ("mcghee", 1),
     ]
-    assert campaign.surfaces["challenge"].cells_per_short_wave == pytest.approx(8)
+    assert campaign.resolution("challenge").cells == pytest.approx(8)
     ratios = [m.surface_energy / m.contact_modulus for m in campaign.materials.values()][2:]
     assert ratios == pytest.approx([8.333e-9, 4.0e-9, 1.905e-9], rel=1e-3)
     # Boundary elements solve the paper's material, and none, at the same loads with the same snapshots.
@@ -51,7 +53,7 @@ def test_the_whole_challenge():
     for name in ("period", "rolloff_wavelength", "short_wavelength"):
         assert getattr(surface, name) == pytest.approx(challenge[f"{name}_m"])
     assert (surface.hurst, study.rms_slopes) == (challenge["hurst"], [challenge["rms_slope"]])
-    assert surface.cells_per_short_wave >= 8
+    assert campaign.resolution("challenge").cells >= 8
     cmc = campaign.materials["cmc"]
     constants = [cmc.contact_modulus, cmc.surface_energy, cmc.interaction_range]
     assert constants == [challenge[key] for key in ("contact_modulus_Pa", "surface_energy_J_m2", "interaction_range_m")]

@@ -61,7 +61,7 @@ def test_settings_depend_on_values_not_on_how_they_are_written(load):
 
 def test_another_file_of_the_same_name_is_another_run(load, tmp_path):
     def checksum():
-        campaign = load({"surfaces.rough": file_surface("own.npy")}).campaign
+        campaign = load({"surfaces.rough": file_surface("own.npy"), "confirmed": ["surfaces.rough.path"]}).campaign
         return run_sha256(campaign, run_cases(campaign)[0])
 
     heights = np.random.default_rng(1).random((16, 16))

@@ -47,7 +47,7 @@ def test_damaged_surface_files(load, tmp_path):
 
 def test_a_surface_file_is_one_realisation_beside_the_configuration(load, tmp_path):
     np.save(tmp_path / "heights.npy", np.random.default_rng(1).normal(size=(16, 16)))
-    campaign = load({"surfaces.rough": file_surface("heights.npy")}).campaign
+    campaign = load({"surfaces.rough": file_surface("heights.npy"), "confirmed": ["surfaces.rough.path"]}).campaign
     assert surface_cases(campaign) == [("rough", 0)]
     assert campaign.surfaces["rough"].path == str(tmp_path / "heights.npy")
     assert surface_settings(campaign, "rough") == {"kind": "file", "period": 1e-3, "metres_per_unit": 1e-6}
@@ -72,6 +72,4 @@ def test_surfaces_with_a_tabulated_spectrum_have_seeds_and_the_slope_of_their_ta
     }
     (tmp_path / "wrong.txt").write_text("1 2\nthree 4\n", encoding="utf-8")
     refused("", changes | {"surfaces.rough": section | {"path": "wrong.txt"}}, "surfaces.rough.path: '")
-    refused(
-        "", changes | {"surfaces.rough": section | {"grid": 16}}, "cells per shortest wavelength; expected at least"
-    )
+    refused("", changes | {"surfaces.rough": section | {"grid": 16}}, "cells per shortest wave; expected at least")

@@ -11,8 +11,7 @@ from icha.contact.models import DEFAULT_MODEL, MODELS, REFERENCE_MODEL
 from icha.datasets.campaign import campaign_tree
 from icha.datasets.files import write_dataset
 from icha.planning import costs
-from icha.planning.validity import self_affine_moments
-from icha.surfaces.moments import summit_density
+from icha.surfaces.moments import self_affine_moments, summit_density
 from icha.surfaces.spectrum import SelfAffineSpectrum
 from icha.surfaces.summits import find_summits
 

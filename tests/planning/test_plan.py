@@ -20,6 +20,7 @@ name: scanned
 title: Scanned
 summary: For tests.
 license: CC0-1.0
+confirmed: [surfaces.scan.grid, surfaces.map.path]
 surfaces:
   rough: {kind: self_affine, period: 100 um, rolloff_wavelength: 40 um, short_wavelength: 14.3 um, hurst: 0.8, grid: 32}
   scan: {kind: measured, path: scan.npy, size: 50 um, height_unit: um, boundary: window}

@@ -8,8 +8,10 @@ import small_campaign as small
 
 from icha.asperity.material import Material
 from icha.asperity.stickiness import stickiness
+from icha.configuration.campaign import Contact
 from icha.configuration.load import load_configuration
-from icha.planning.validity import expected_validity, surface_facts
+from icha.configuration.plausibility import rms_curvature
+from icha.planning.validity import expected_validity
 from icha.surfaces.measured.topography import prepared_topography
 from icha.surfaces.moments import spectral_moments
 
@@ -18,6 +20,7 @@ name: outside
 title: Outside
 summary: For tests.
 license: CC0-1.0
+confirmed: [surfaces.scan.grid]
 surfaces:
   rough: {kind: self_affine, period: 100 um, rolloff_wavelength: 40 um, short_wavelength: 14.3 um, hurst: 0.8, grid: 32}
   scan: {kind: measured, path: scan.npy, size: 50 um, height_unit: um, boundary: window}
@@ -48,12 +51,11 @@ def campaign(tmp_path):
 
 def test_curvatures_are_those_of_the_surfaces(campaign):
     surface = small.surface()
-    assert surface_facts(campaign, "rough")["rms_curvature"] == pytest.approx(
-        surface.rms_curvature / surface.rms_slope, rel=0.1
-    )
+    rough, scanned = (Contact(name, 0, 1.0, "bare") for name in ("rough", "scan"))
+    assert rms_curvature(campaign, rough) == pytest.approx(surface.rms_curvature / surface.rms_slope, rel=0.1)
     section = campaign.surfaces["scan"]
     scan = prepared_topography(section.path, section.preparation).surface
-    assert surface_facts(campaign, "scan")["rms_curvature"] == pytest.approx(scan.rms_curvature / scan.rms_slope)
+    assert rms_curvature(campaign, scanned) == pytest.approx(scan.rms_curvature / scan.rms_slope)
 
 
 def test_materials_and_surfaces_outside_are_named_before_the_run(campaign):
@@ -61,7 +63,7 @@ def test_materials_and_surfaces_outside_are_named_before_the_run(campaign):
     assert not found["jump-in"].good
     assert "expected outside this range: below on rough (about 0.63)" in found["jump-in"].text
     assert "bare" not in found["jump-in"].text and "inside on" not in found["jump-in"].text
-    assert "the accuracy of this campaign is unknown (rough: nodes per shortest wave" in found["accuracy"].text
+    assert "the accuracy of this campaign is unknown (rough: cells per shortest wave" in found["accuracy"].text
     assert ". scan: " in found["accuracy"].text
     assert "sticky" not in found
 

@@ -78,14 +78,14 @@ def test_above_the_noise_a_cutoff_is_advised_that_removes_it(examined):
 def test_summits_as_small_as_pixels_are_to_be_filtered_until_they_are_resolved(examined):
     fine = SelfAffineSpectrum(SIDE, 50e-6, 2.001 * SIDE / GRID, 0.8, rms_slope=0.1).realise(GRID, 1)
     scan = examined(fine)
-    assert scan.noise is None and scan.cells_per_summit < 80
+    assert scan.noise is None and not scan.resolution.reaches(4)
     assert scan.advice == {"cutoff": pytest.approx(8 * SIDE / GRID)}
     again = examined(fine, **scan.advice)
-    assert again.cells_per_summit > 80 and again.advice == {}
+    assert again.resolution.reaches(4) and again.advice == {}
 
 
 def test_a_resolved_surface_needs_nothing_and_a_needlessly_fine_grid_is_reported(examined):
     resolved = SelfAffineSpectrum(SIDE, 50e-6, 10e-6, 0.8, rms_slope=0.1).realise(GRID, 1)
     scan = examined(resolved, boundary="periodic")
-    assert scan.noise is None and scan.advice == {} and scan.cells_per_summit > 80
+    assert scan.noise is None and scan.advice == {} and scan.resolution.reaches(8)
     assert examined(resolved, boundary="periodic", cutoff=10e-6).advice == {"grid": 80}

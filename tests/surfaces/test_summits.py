@@ -281,4 +281,4 @@ def test_boundary_elements_are_marked_where_cells_are_too_few():
     for heights, marked in ((white, True), (_smooth(1), False)):
         surface = Surface(heights, PERIOD).scaled_to_rms_slope(0.3)
         run = simulate(surface, Material(2e6, 0.0, 2e-9), Path(reduced_pressures=[1e-2]), model="boundary_elements")
-        assert ("grid cells for the shortest waves" in run.attrs["applicability"]) == marked
+        assert ("cells per shortest wave" in run.attrs["applicability"]) == marked

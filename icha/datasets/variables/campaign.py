@@ -46,6 +46,7 @@ VARIES_WITH = {
     **dict.fromkeys(("rms_height", "rms_curvature", "unit_height", "unit_slope", "nayak_parameter"), _TOPOGRAPHY),
     **dict.fromkeys(("spectral_moment_0", "spectral_moment_2", "spectral_moment_4"), _TOPOGRAPHY),
     **dict.fromkeys(("height_skewness", "height_kurtosis", "slope_anisotropy"), _TOPOGRAPHY),
+    **dict.fromkeys(("short_wavelength", "short_wavelength_estimated"), ("surface", "seed")),
     **dict.fromkeys(("period", "grid", "boundary", "shape", "shape_radius"), ("surface",)),
     **dict.fromkeys(bin_table("gap", "m"), _TOPOGRAPHY),
     **dict.fromkeys(bin_table("pressure", "Pa"), ("rms_slope", "material")),

@@ -31,6 +31,8 @@ _ATTRIBUTES = {
     "full_contact_energy_ratio": {INFINITE: "without adhesion"},
     "contact_stiffness": {INFINITE: "in full contact"},
     "stiffness": {INFINITE: "in full contact"},
+    "short_wavelength": {INFINITE: "on a smooth shape without waves"},
+    "tabor_parameter": {INFINITE: "on a smooth shape without a radius of curvature"},
     "slope_anisotropy": {INFINITE: "for straight grooves"},
     "gap_map": {INFINITE: "where a shape has no surface"},
     "event_kind": {

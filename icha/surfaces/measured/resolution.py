@@ -12,13 +12,8 @@ import scipy.fft
 from icha.surfaces.measured.defects import Defects
 from icha.surfaces.measured.settings import Preparation
 from icha.surfaces.measured.topography import LEAST_PIXELS, PreparedTopography, defects_of, prepared_topography
-from icha.surfaces.moments import (
-    LEAST_CELLS_OF_SUMMIT,
-    RESOLVED_CELLS,
-    cells_per_short_wave,
-    radial_power_spectrum,
-    slope_anisotropy,
-)
+from icha.surfaces.moments import radial_power_spectrum, slope_anisotropy
+from icha.surfaces.resolution import LEAST_CELLS, RECOMMENDED_CELLS, Resolution, resolution_of
 from icha.surfaces.summits import Asperities, SummitCoverage, locate_summits
 from icha.surfaces.surface import FREE, PERIODIC, Surface, edges_fit
 
@@ -105,15 +100,10 @@ class ScanResolution(PreparedTopography):
         heights = np.linspace(3, 1, 5) * self.surface.rms_height
         return SummitCoverage.of(self.surface, self.asperities).reasons_against(heights)
 
-    @property
-    def cells_per_summit(self) -> float:
-        """Number of nodes per summit of the prepared surface."""
-        return self.surface.grid**2 / max(self.summits, 1)
-
-    @property
-    def cells_per_short_wave(self) -> float:
-        """Nodes per shortest wavelength of the prepared surface, estimated from the number of summits."""
-        return cells_per_short_wave(self.surface.grid, self.summits)
+    @cached_property
+    def resolution(self) -> Resolution:
+        """Number of cells per shortest wave of the prepared surface, estimated from its spectrum."""
+        return resolution_of(self.surface)
 
     @cached_property
     def noise(self) -> NoiseFloor | None:
@@ -128,14 +118,14 @@ class ScanResolution(PreparedTopography):
         noise = self.noise if self.noise is not None and self.noise.slope_share >= _NOTICEABLE else None
         if noise is not None and cutoff < noise.wavelength * (1 - 1e-9):
             found["cutoff"] = _rounded_up(max(noise.wavelength, LEAST_PIXELS * pixel))
-        elif self.cells_per_summit < LEAST_CELLS_OF_SUMMIT and cutoff < RESOLVED_CELLS * pixel * (1 - 1e-9):
-            found["cutoff"] = _rounded_up(RESOLVED_CELLS * pixel)
+        elif not self.resolution.reaches(LEAST_CELLS) and cutoff < RECOMMENDED_CELLS * pixel * (1 - 1e-9):
+            found["cutoff"] = _rounded_up(RECOMMENDED_CELLS * pixel)
         cutoff = found.get("cutoff", cutoff)
         if cutoff:
-            grid = scipy.fft.next_fast_len(math.ceil(RESOLVED_CELLS * self.surface.period / cutoff), real=True)
+            grid = scipy.fft.next_fast_len(math.ceil(RECOMMENDED_CELLS * self.surface.period / cutoff), real=True)
             if grid <= _WORTH * self.surface.grid:
                 found["grid"] = grid
-        return found if found.get("cutoff", 0.0) < self.measured.period / RESOLVED_CELLS else {}
+        return found if found.get("cutoff", 0.0) < self.measured.period / RECOMMENDED_CELLS else {}
 
 
 def filtered_slope_share(surface: Surface, cutoff: float) -> float:

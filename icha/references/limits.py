@@ -1,0 +1,107 @@
+"""Limits of a run that are known before it starts: cells that resolve the contact, and the range of the attraction."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+
+from icha.asperity.material import Material
+from icha.asperity.tabor import describe_short_range
+from icha.contact.models import MODELS
+from icha.path.targets import (
+    AREA_FRACTION,
+    CONTACT_RADIUS,
+    FORCE,
+    INDENTATION,
+    MEAN_SEPARATION,
+    NOMINAL_PRESSURE,
+    REDUCED_PRESSURE,
+    RELATIVE_LOAD,
+    Path,
+)
+from icha.references.indentation import axisymmetric_contact, sphere_contact, stable_branches
+from icha.surfaces.resolution import LEAST_CELLS, RADIUS, Resolution, resolution_of
+from icha.surfaces.shapes import Paraboloid, Shape
+from icha.surfaces.surface import FREE, Surface
+
+# Contact radii at which states of a shape are computed, divided by half the side of the square.
+_RADII = np.geomspace(1e-5, math.sqrt(2), 4000)
+
+
+def radius_at_target(shape: Shape, side: float, material: Material, kind: str, value: float) -> float:
+    """Return the contact radius of a smooth shape on a half-space at a target of the first loading, m.
+
+    A layer counts as a half-space. A paraboloid of two radii counts as a sphere of the same mean radius. The result is
+    0 if there is no contact yet.
+
+    Parameters
+    ----------
+    side : side of the square, m; the radius is at most that of a circle around the square.
+    kind, value : target, as in `icha.path.targets.Target`.
+    """
+    if kind == AREA_FRACTION:
+        return side * math.sqrt(value / math.pi)
+    if kind == CONTACT_RADIUS:
+        return value
+    if (end := shape.end_radius) is not None:
+        return end
+    radii = _RADII * side / 2
+    if isinstance(shape, Paraboloid):
+        states = sphere_contact(radii, shape.sphere_radius, material.contact_modulus, material.surface_energy)
+    else:
+        radii = radii[radii < getattr(shape, "radius", math.inf)]
+        states = axisymmetric_contact(radii, shape.slope, material.contact_modulus, material.surface_energy)
+    control = "indentation" if kind in (INDENTATION, MEAN_SEPARATION) else "force"
+    prescribed = _prescribed(shape, side, material, kind, value)
+    loading, _ = stable_branches(states, control)
+    given = np.asarray(getattr(states, control))[loading]
+    if not len(given):  # adhesion pulls the whole square into contact
+        return float(radii[-1])
+    return float(np.interp(prescribed, given, radii[loading], left=0.0))
+
+
+def _prescribed(shape, side, material, kind, value):
+    """Return the indentation, m, or the force, N, of a target."""
+    area, modulus = side**2, material.contact_modulus
+    if kind == REDUCED_PRESSURE:
+        # The unit of slopes of a shape hardly depends on the grid.
+        return value * modulus * area * Surface(np.zeros((64, 64)), side, FREE, shape).unit_slope
+    factors = {FORCE: 1.0, NOMINAL_PRESSURE: area, RELATIVE_LOAD: modulus * area, INDENTATION: 1.0, MEAN_SEPARATION: -1}
+    return value * factors[kind]
+
+
+def contact_resolution(
+    shape: Shape, side: float, grid: int, material: Material, targets: Iterable[tuple[str, float]]
+) -> Resolution:
+    """Return the number of cells in the smallest contact radius of a smooth shape at targets (kind, value)."""
+    radii = [radius_at_target(shape, side, material, *target) for target in targets]
+    return Resolution(min((radius for radius in radii if radius), default=math.inf) * grid / side, RADIUS)
+
+
+def doubts(surface: Surface, material: Material, path: Path, model: str) -> list[str]:
+    """Describe what makes the results of a run doubtful before it starts: a coarse grid, or a long range of attraction.
+
+    A campaign refuses such runs unless they are confirmed. `icha.simulate` warns.
+    """
+    coarse = [resolution_of(surface)]
+    if surface.smooth:
+        targets = [(target.kind, target.value) for target in path.targets]
+        coarse.append(contact_resolution(surface.shape, surface.period, surface.grid, material, targets))
+    found = [
+        f"the grid of {surface.grid} nodes gives {each}; expected {each.grids(surface.grid)}"
+        for each in coarse
+        if not each.reaches(LEAST_CELLS)
+    ]
+    if MODELS[model].by_cells and material.surface_energy:
+        if text := describe_short_range(tabor_parameter_of(surface, material)):
+            found.append(f"boundary elements assume a short range of attraction, but {text}")
+    return found
+
+
+def tabor_parameter_of(surface: Surface, material: Material) -> float:
+    """Return the Tabor parameter of a summit, or of a smooth shape; infinite for a shape without a radius."""
+    if surface.smooth and surface.shape.sphere_radius is None:
+        return math.inf
+    return float(material.tabor_parameter(surface.summit_radius))
