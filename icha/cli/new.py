@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from icha.cli.project import CAMPAIGNS, UserError, echo, find_workflow, list_campaigns, option, project, shorten_path
-from icha.cli.scans import describe_scan, read_measured_section
+from icha.cli.scans import describe_scan, read_measured_section, show_first_lines
 
 TEMPLATES = Path(__file__).parent / "templates"
 # Explanations of the keys of a configuration: a schema for text editors, and a page for readers.
@@ -53,6 +53,9 @@ def new(
         raise UserError("--data needs a measured file; use it with --measured FILE")
     if indenter and (measured or pull_off or boundary_elements):
         raise UserError("--indenter cannot be combined with other options; expected --indenter alone")
+    if measured is not None:
+        for line in show_first_lines(measured):
+            echo(line)
     section = None if measured is None else read_measured_section(measured, data, file.parent)
     file_of_template = TEMPLATES / ("indenter.yaml" if indenter else "campaign.yaml")
     template = Template(file_of_template.read_text(encoding="utf-8"), trim_blocks=True, keep_trailing_newline=True)
@@ -86,7 +89,7 @@ def _schema() -> Path:
 
 def _print_section(section: dict) -> None:
     """Print the description of a scan, and the keys that the user must fill in."""
-    to_scale = not section["to_fill_in"].keys() - {"boundary"}
+    to_scale = not section["to_fill_in"].keys() - {"boundary", "scattered"}
     for line in describe_scan(section["name"], section["scan"], to_scale=to_scale):
         echo(line)
     for key, reason in section["to_fill_in"].items():

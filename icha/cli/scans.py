@@ -24,7 +24,21 @@ MOST_FILLED = 0.05
 MUCH_CURVATURE, ANISOTROPIC = 0.5, 1.5
 # A file may lack these keys. ICHA then assumes the values of GUESSES (in m), and shows those of EXAMPLES to the user.
 GUESSES = {"height_unit": 1e-9, "size": (1e-4, 1e-4), "scattered": "interpolate"}
-EXAMPLES = {"height_unit": "nm", "lateral_unit": "um", "size": "[90 um, 90 um]"}
+EXAMPLES = {"height_unit": "nm", "lateral_unit": "um", "size": "[90 um, 90 um]", "scattered": "interpolate"}
+# Lines of a text file, and characters of a line, that `icha new` prints.
+SHOWN_LINES, SHOWN_WIDTH = 6, 72
+
+
+def show_first_lines(path: Path) -> Iterator[str]:
+    """Yield the first lines of a text file for the user; no lines for other files."""
+    from icha.surfaces.measured.text_tables import first_lines
+
+    lines = [] if problem_with_path(path) else first_lines(path)[:SHOWN_LINES]
+    if any(lines):
+        yield f"{path.name} begins with:"
+    for line in lines if any(lines) else []:
+        text = printable(line.rstrip().replace("\t", " "))
+        yield f"  {text[:SHOWN_WIDTH]}{' …' if len(text) > SHOWN_WIDTH else ''}"
 
 
 def describe_scan(name: str, scan, *, to_scale: bool = True, models: Iterable[Model] = ()) -> Iterator[str]:
@@ -198,10 +212,6 @@ def read_measured_section(path: Path, data: str | None, folder: Path) -> dict[st
         points += f", heights from {np.nanmin(scan.heights) * 1e6:.4g} um to {np.nanmax(scan.heights) * 1e6:.4g} um"
     lines.append(points)
     lines += [f"{key}:        # to fill in (not in the file), for example {EXAMPLES[key]}" for key in missing]
-    if "scattered" in guessed:
-        lines.append(
-            "scattered: interpolate       # the points are on no regular grid; with `refuse`, this is an error"
-        )
     if not np.isfinite(scan.heights).all():
         lines.append("missing: fill                # some points have no height; with `refuse`, this is an error")
     lines += [f"# {key:<27}# recommended; see the output of `icha new`" for key in keys_for_defects(resolution)]
@@ -230,8 +240,7 @@ def _load(path: Path, data: str | None):
                 hint = "; choose one with --data NAME" if error.key == "data" else ""
                 raise UserError(f"--measured {path}: {error.key} {error}{hint}") from None
             guessed[error.key] = GUESSES[error.key]
-            if error.key != "scattered":
-                missing[error.key] = str(error)
+            missing[error.key] = str(error)
     if "size" in missing:
         rows, columns = scan.heights.shape  # most scans have square pixels
         guessed["size"] = columns * 1e-6, rows * 1e-6

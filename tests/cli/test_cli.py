@@ -187,6 +187,29 @@ def test_scans_that_cannot_be_used_get_no_campaign(project):
     assert not (CAMPAIGNS / "other.yaml").exists()
 
 
+def test_a_text_is_shown_and_what_is_missing_is_asked(project):
+    rows = [" ".join(f"{height:.4f}" for height in row) for row in rough_heights()[:24, :24] * 1e9]
+    Path("scan.txt").write_text("\n".join(["Width: 20 um", "Lines: 24", "Unit: nm", *rows]))
+    written = output("new", "one", "--measured", "scan.txt")
+    assert "scan.txt begins with:\n  Width: 20 um\n  Lines: 24\n  Unit: nm\n" in written
+    assert "read as matrix" in written and "to fill in: surfaces.scan.size (is missing" in written
+    Path("numbered.csv").write_text(
+        "\n".join([",".join(map(str, range(24))), *(row.replace(" ", ",") for row in rows)])
+    )
+    assert "numbered.csv begins with:\n  0,1,2,3" in output("new", "two", "--measured", "numbered.csv", status=2)
+    assert "first row of numbers, 1, 2, 3" in printed("new", "two", "--measured", "numbered.csv", status=2)
+    # Missing points of a grid, and points on no grid.
+    y, x = np.mgrid[:24, :24] * 0.5
+    table = np.column_stack([x.ravel(), y.ravel(), rough_heights()[:24, :24].ravel() * 1e9])
+    table[[7, 90, 300]] = np.nan
+    np.savetxt("points.xyz", table, fmt="%.4f")
+    written = output("new", "three", "--measured", "points.xyz")
+    assert "heights of 3 points interpolated" in written and "scattered" not in (CAMPAIGNS / "three.yaml").read_text()
+    np.savetxt("cloud.xyz", table + 0.1 * np.random.default_rng(1).normal(size=table.shape), fmt="%.4f")
+    assert "to fill in: surfaces.cloud.scattered" in output("new", "four", "--measured", "cloud.xyz")
+    assert yaml.safe_load((CAMPAIGNS / "four.yaml").read_text())["surfaces"]["cloud"]["scattered"] is None
+
+
 def test_data_names_one_of_several_arrays_of_a_measured_file(project):
     with h5py.File("my.h5", "w") as file:
         for name in ("first", "second"):
