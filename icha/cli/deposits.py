@@ -94,9 +94,9 @@ def reproduce(
     """Compute the results of a deposit again and compare every number with the published number.
 
     The command verifies the deposit and does not change any file. The installed ICHA computes the configuration of the
-    deposit. The installed ICHA and its packages must have the versions that made the deposit. No code of the deposit
-    is executed. The command reports each variable as identical, within tolerance, or different. With `--only smallest`
-    the command takes some minutes.
+    deposit. The installed ICHA, and its packages that compute, must have the versions that made the deposit; the
+    command lists other packages that have other versions. No code of the deposit is executed. The command reports each
+    variable as identical, within tolerance, or different. With `--only smallest` the command takes some minutes.
 
     Exit status: 0 if all variables are identical or within tolerance, 1 if a variable differs or the computation
     fails or is stopped, 2 if the deposit is damaged or missing, or cannot be computed again.
@@ -139,13 +139,19 @@ def _introduce(deposit: Path, original: Path, folder: Path | None) -> None:
     from icha.deposit.reproduce import RerunError, other_versions
 
     echo(f"deposit:    {printable(deposit)}, {_contents(original)}")
-    if differences := other_versions(original):
+    differences, others = other_versions(original)
+    if differences:
         raise RerunError(
             "was made with versions that differ from the installed versions; expected the same versions. Run "
             "`make environment` in a clone of the deposit's version, or in a copy of the deposit's source:\n"
             + "\n".join(differences)
         )
     echo(f"program:    the installed ICHA {version('icha')}; nothing in the deposit is executed")
+    if others:
+        echo(
+            "Warning: other versions of packages that compute nothing:\n" + "\n".join(map(printable, others)),
+            fg="yellow",
+        )
     echo(f"writes to:  {shorten_path(folder) if folder else 'a temporary folder'}")
 
 

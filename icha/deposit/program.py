@@ -199,7 +199,7 @@ def refuse_other_environment(project: Path, results: Path) -> None:
         the project, or if results may have been made with other versions (`note_versions`).
     """
     lock = (project / "uv.lock").read_text(encoding="utf-8")
-    wrong = version_differences(lock)
+    wrong = [f"  {name}: {text}" for name, text in version_differences(lock).items()]
     expected, imported = package_of(project.resolve()), Path(importlib.util.find_spec("icha").origin).resolve().parent
     if imported != expected:
         wrong.insert(0, f"  icha: imported from {imported}; expected from {expected}")
@@ -221,17 +221,17 @@ def refuse_other_environment(project: Path, results: Path) -> None:
         )
 
 
-def version_differences(lock: str) -> list[str]:
-    """List the installed packages whose version is not the locked version; `lock` is the text of uv.lock.
+def version_differences(lock: str) -> dict[str, str]:
+    """Return a text for each installed package whose version is not the locked version; `lock` is the text of uv.lock.
 
     Locked packages that are not installed are left out, since no environment has all optional packages.
     """
     locked = locked_versions(lock)
-    return [
-        f"  {name}: {version} is installed, {locked[name]} is locked"
+    return {
+        name: f"{version} is installed, {locked[name]} is locked"
         for name, version in sorted(installed_versions().items())
         if locked.get(name, version) != version
-    ]
+    }
 
 
 def installed_versions() -> dict[str, str]:

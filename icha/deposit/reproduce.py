@@ -27,6 +27,8 @@ from icha.support.values import NAME_PATTERN
 SMALLEST = "smallest"
 # Two files in the source of a deposit: one with the version of the program, one with the versions of all packages.
 _PYPROJECT, _LOCK = f"{SOURCE}/pyproject.toml", f"{SOURCE}/uv.lock"
+# Packages that compute or read the numbers of results. All other packages draw, write, check or schedule.
+_COMPUTING = {"finufft", "mugrid", "numpy", "pandas", "scipy", "surfacetopography", "tamaas"}
 # Entries in the folder of a rerun: file with the checksum of SHA256SUMS, and folder for configuration and results.
 _BEGUN, _PROJECT = "rerun-of.sha256", "data"
 _RUN = re.compile(r"runs(/[^/]+){4}/[^/]+\.nc")
@@ -51,19 +53,22 @@ def campaign_name(deposit: Path) -> str:
     return name
 
 
-def other_versions(deposit: Path) -> list[str]:
-    """List ICHA and packages whose installed versions differ from the versions that made the deposit."""
+def other_versions(deposit: Path) -> tuple[list[str], list[str]]:
+    """List ICHA and packages whose installed versions differ from the versions that made the deposit.
+
+    The first list has ICHA and the packages that compute (`_COMPUTING`); the second list has all other packages.
+    """
     try:
         made_by = tomllib.loads(read_text(deposit, _PYPROJECT))["project"]["version"]
-        wrong = version_differences(read_text(deposit, _LOCK))
+        found = version_differences(read_text(deposit, _LOCK))
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise RerunError(
             f"{_PYPROJECT} or {_LOCK} cannot be read; expected a file with the program's version, and a uv lock file"
         ) from None
     installed = version("icha")
-    if made_by != installed:
-        wrong.insert(0, f"  icha: {installed} is installed, {made_by} made the deposit")
-    return wrong
+    wrong = [f"  icha: {installed} is installed, {made_by} made the deposit"] if made_by != installed else []
+    wrong += [f"  {name}: {text}" for name, text in found.items() if name in _COMPUTING]
+    return wrong, [f"  {name}: {text}" for name, text in found.items() if name not in _COMPUTING]
 
 
 def find_runs(only: Iterable[str], deposit: Path) -> list[str]:

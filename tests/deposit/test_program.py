@@ -188,8 +188,8 @@ def write_lock(folder, **versions):
 
 def test_another_environment_than_the_locked_one_is_refused(tmp_path):
     numpy = importlib.metadata.version("numpy")
-    assert version_differences(write_lock(tmp_path, NumPy=numpy, nobody="1")) == []
-    assert version_differences(write_lock(tmp_path, NumPy="0.1")) == [f"  numpy: {numpy} is installed, 0.1 is locked"]
+    assert version_differences(write_lock(tmp_path, NumPy=numpy, nobody="1")) == {}
+    assert version_differences(write_lock(tmp_path, NumPy="0.1")) == {"numpy": f"{numpy} is installed, 0.1 is locked"}
     with pytest.raises(ValueError, match=r"make environment(.|\n)*icha: imported from(.|\n)*numpy: "):
         refuse_other_environment(tmp_path, tmp_path / "results")
 

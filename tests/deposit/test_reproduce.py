@@ -38,10 +38,14 @@ studies:
 LEAVES_A_MARK = "import pathlib; pathlib.Path({mark!r}).touch()\n"
 
 
-def lock(numpy=None):
-    """A lock file with numpy alone, in the version that is installed or in another one."""
-    numpy = numpy or version("numpy")
-    return f'[[package]]\nname = "numpy"\nversion = "{numpy}"\nsource = {{ registry = "https://pypi.org/simple" }}\n'
+def lock(numpy=None, rich=None):
+    """A lock file with two packages, in the versions that are installed or in others."""
+    versions = {"numpy": numpy or version("numpy"), "rich": rich or version("rich")}
+    source = '{ registry = "https://pypi.org/simple" }'
+    lines = (
+        f'[[package]]\nname = "{name}"\nversion = "{each}"\nsource = {source}\n' for name, each in versions.items()
+    )
+    return "".join(lines)
 
 
 def write_run(path, steps=3, factor=1.0, size=1, **attributes):
@@ -181,6 +185,15 @@ def test_a_folder_continues_its_own_rerun_only(deposit, reproduce, computed, tmp
         status, output = reproduce(packed, "--folder", folder)
         assert status == 2 and message in output, output
     assert problems_with(packed) == [] and len(computed) == 2
+
+
+def test_other_versions_of_packages_that_compute_nothing_are_named(deposit, reproduce, computed):
+    status, output = reproduce(deposit(**{"source/uv.lock": lock(rich="13.0.1")}))
+    assert status == 0 and len(computed) == 1
+    named = (
+        rf"Warning: other versions of packages that compute nothing:\s+rich: {version('rich')} is installed, 13.0.1 is"
+    )
+    assert re.search(named, output), output
 
 
 @pytest.mark.parametrize(
