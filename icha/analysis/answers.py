@@ -4,12 +4,13 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
+import numpy as np
 import xarray as xr
 
 from icha.analysis.control_variates import PROBABILITY
 from icha.analysis.estimates import LOOP
 from icha.datasets import table
-from icha.path.targets import UNITS
+from icha.path.targets import OF_SQUARES, PER_NOMINAL_AREA, UNITS
 from icha.support.formatting import choose_unit, format_quantity
 
 # Words for quantities and for targets.
@@ -21,6 +22,13 @@ WORDS = {
     "nominal_pressure": "pressure",
     "pull_off_pressure": "pull-off tension",
     "hysteresis_loss": "loss of a loop",
+    "contact_radius": "contact radius",
+    "stiffness": "stiffness",
+    "force": "force",
+    "pull_off_force": "pull-off force",
+    "loss_over_contact": "loss divided by contact area and surface energy",
+    "work_of_adhesion_approach": "work of adhesion on approach",
+    "work_of_adhesion_retraction": "work of adhesion on retraction",
 }
 _LEVELS = {
     "asperity_seeds": "the asperity model",
@@ -76,8 +84,14 @@ class Answer(NamedTuple):
 
 
 def answers_of(study: xr.Dataset) -> list[Answer]:
-    """Return the answers of a study; `study` is a group of the dataset of `icha.analysis.estimates`."""
-    return [_answer(study.isel(answer=k)) for k in range(study.sizes["answer"])]
+    """Return the answers of a study; `study` is a group of the dataset of `icha.analysis.estimates`.
+
+    For surfaces that are single squares, such as lenses, quantities per nominal area are left out.
+    """
+    quantities, surfaces = study["quantity"].values, study["surface"].values
+    squares = surfaces[np.isin(quantities, OF_SQUARES)]
+    shown = ~(np.isin(quantities, PER_NOMINAL_AREA) & np.isin(surfaces, squares))
+    return [_answer(study.isel(answer=k)) for k in np.flatnonzero(shown)]
 
 
 def _answer(row: xr.Dataset) -> Answer:

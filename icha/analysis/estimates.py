@@ -20,7 +20,7 @@ from icha.datasets.campaign import loading_stops
 from icha.datasets.labels import LABELS, coarse_study, inputs_study, is_derived_study, slopes_at
 from icha.datasets.variables.answers import ANSWERS
 from icha.datasets.variables.campaign import COMPLETE, LOADED_RUNS
-from icha.path.targets import ESTIMATED_AT_TARGETS, ESTIMATED_OF_LOOPS
+from icha.path.targets import ESTIMATED_AT_TARGETS, ESTIMATED_OF_LOOPS, OF_SQUARES
 
 LOOP = "loop"
 
@@ -71,8 +71,11 @@ def _answers(
         if (kind == LOOP) != (quantity in ESTIMATED_OF_LOOPS) or prescribed or quantity not in study:
             continue
         values = {level: values_of(data, model, quantity, kind, target) for level, (data, model) in levels.items()}
+        known = study[quantity].notnull().any([dim for dim in study[quantity].dims if dim != "surface"]).values
         areas = values_of(study, REFERENCE_MODEL, "contact_area_fraction", kind, target) if kind != LOOP else None
         for surface, slope, material in itertools.product(*(range(study.sizes[dim]) for dim in CONTACT)):
+            if quantity in OF_SQUARES and not known[surface]:
+                continue  # a periodic surface
             by_seed = {level: _by_seed(of_level, surface, slope, material) for level, of_level in values.items()}
             if any(math.isinf(value) for level in by_seed.values() for value in level.values()):
                 continue  # the stiffness of full contact

@@ -114,7 +114,13 @@ ESTIMATED_AT_TARGETS: dict[str, tuple[str, ...]] = {
     "nominal_pressure": LOADS,
 }
 # Quantities of a loop whose means are estimated.
-ESTIMATED_OF_LOOPS = ("pull_off_pressure", "hysteresis_loss")
+ESTIMATED_OF_LOOPS: tuple[str, ...] = ("pull_off_pressure", "hysteresis_loss")
+# Quantities per nominal area, which mean nothing for a single square such as a lens, and further ones for a square.
+PER_NOMINAL_AREA = (*ESTIMATED_AT_TARGETS.keys() - {"spot_count"}, *ESTIMATED_OF_LOOPS)
+OF_SQUARES = ("contact_radius", "stiffness", "force", "pull_off_force", "loss_over_contact")
+OF_SQUARES += ("work_of_adhesion_approach", "work_of_adhesion_retraction")
+ESTIMATED_AT_TARGETS |= {"contact_radius": AREAS, "stiffness": (), "force": LOADS}
+ESTIMATED_OF_LOOPS += tuple(name for name in OF_SQUARES if name not in ESTIMATED_AT_TARGETS)
 # Kind of the target of an equilibrium between the targets of a path. The value of this target is the mean separation.
 BETWEEN = "path"
 # Units of the values of targets with a unit, by kind; the values of all other kinds have no unit.

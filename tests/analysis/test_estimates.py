@@ -116,6 +116,38 @@ def test_pull_off_and_loss_of_loops_are_positive_means():
         assert 0 <= row["estimate_low"] < row["estimate"] < row["estimate_high"]
 
 
+def test_answers_of_a_lens_are_forces_radii_and_works_of_adhesion():
+    def lens(run):
+        """The run as one of a free square with a shape."""
+        area = float(run["period"]) ** 2
+        of_steps = {
+            "force": (run["nominal_pressure"] * area, "N"),
+            "contact_radius": ((run["contact_area_fraction"] * area / np.pi) ** 0.5, "m"),
+            "stiffness": (run["contact_stiffness"] * area, "N m^-1"),
+            "pull_off_force": (run["pull_off_pressure"] * area, "N"),
+            "work_of_adhesion_retraction": (run["surface_energy"] * 0.9, "J m^-2"),
+        }
+        added = {name: value.assign_attrs(units=unit, long_name=name) for name, (value, unit) in of_steps.items()}
+        return run.assign(added | {"resolved_tension": 1.0}).assign_attrs(contact_model="boundary_elements")
+
+    labels = RunLabels("pull", "boundary_elements", "rough", 1, 1.0, "soft")
+    runs = [cyclic.unloaded(small.run(seed=seed, material="soft")) for seed in (1, 2, 3)]
+    tree = campaign_tree((labels._replace(seed=k), lens(run)) for k, run in enumerate(runs))
+    rows = answers_of(estimate_campaign(tree)["pull"].to_dataset())
+    expected = {
+        "contact radius",
+        "force",
+        "stiffness",
+        "number of contact patches",
+        "pull-off force",
+        "work of adhesion on retraction",
+    }
+    assert {each.quantity for each in rows} == expected
+    (work,) = (each for each in rows if "work" in each.quantity)
+    assert work.unit == "mJ/m²" and work.value == pytest.approx(900 * float(runs[0]["surface_energy"]))
+    assert all(each.unit.endswith("N") for each in rows if each.quantity == "pull-off force")
+
+
 def test_failed_runs_and_those_without_a_model_do_not_count():
     def broken(labels, run):
         bad = labels.seed == 1 and labels.model == "asperities" and labels.material == "soft"
