@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 from icha.asperity.full_contact import HIGH_PULL_OFF_BELOW, full_contact_energy_ratio
 from icha.asperity.material import Material
 from icha.asperity.stickiness import stickiness
-from icha.checks.run import check_run, reasons_of_failure
+from icha.checks.run import attributes_of_failure, check_run
 from icha.contact.model import (
     EVENT_KINDS,
     GAP_BINS,
@@ -159,9 +159,12 @@ def simulate(
     dataset = _compute(solver, surface, material, path, model, seed, progress, kept)
     if dataset.attrs["applicability"]:
         warnings.warn(dataset.attrs["applicability"], IchaWarning, stacklevel=2)
-    if failed := reasons_of_failure(check_run(dataset)):
-        dataset = dataset.assign_attrs(failed_checks=failed)
-        warnings.warn(f"The run fails checks; do not use the numbers of this run: {failed}", IchaWarning, stacklevel=2)
+    for name, reasons in attributes_of_failure(check_run(dataset)).items():
+        dataset = dataset.assign_attrs({name: reasons})
+        invalid = "hysteresis loss" if name == "failed_loss_checks" else "numbers"
+        warnings.warn(
+            f"The run fails checks; do not use the {invalid} of this run: {reasons}", IchaWarning, stacklevel=2
+        )
     return dataset
 
 

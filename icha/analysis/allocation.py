@@ -76,14 +76,19 @@ def allocate(
         before = counts
         wanted = {level: np.sqrt(a / costs[level]) * spent * width**2 / left for level, a in per_seed.items()}
         counts = {level: max(_LEAST[level], math.ceil(float(n.max()) * (1 - 1e-9))) for level, n in wanted.items()}
-        # Each level contains the seeds of the next one.
-        fewest = 0
-        for level in reversed(counts):
-            counts[level] = fewest = max(counts[level], fewest)
+        counts = nest(counts)
         if counts == before:
             break
         width = np.maximum(width, _width(per_seed, counts))
     return counts
+
+
+def nest(counts: Mapping[str, int]) -> dict[str, int]:
+    """Return numbers of seeds that are large enough for each level to contain the seeds of the next one."""
+    nested, fewest = dict(counts), 0
+    for level in reversed(nested):
+        nested[level] = fewest = max(nested[level], fewest)
+    return nested
 
 
 def _width(per_seed, counts):

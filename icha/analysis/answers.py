@@ -48,10 +48,10 @@ class Answer(NamedTuple):
     contact : text with surface, rms slope and material.
     state : text with the target of the state; empty for a quantity of a loop.
     quantity : name of the quantity in words.
-    value, low, high : estimate and ends of its interval in `unit`.
+    value, low, high : estimate and ends of its interval in `unit`; NaN if none is stated.
     unit : unit; "" for counts.
     shares : half-width in `unit` by cause: seeds, model, grid, inputs.
-    note : text about seeds with full contact; empty if there are none.
+    note : text about runs that are left out, and about seeds with full contact; empty if there are none.
     limit : sentence that names what limits the accuracy.
     """
 
@@ -72,15 +72,29 @@ class Answer(NamedTuple):
         return (self.high - self.low) / 2
 
     @property
-    def number(self) -> str:
-        """Estimate with interval, and the contributions to the interval, as text; a wide interval as its two ends."""
-        digits = max(0, 1 - math.floor(math.log10(self.half_width))) if self.half_width > 0 else 3
+    def _digits(self) -> int:
+        """Number of decimal places of the estimate and its interval."""
+        return max(0, 1 - math.floor(math.log10(self.half_width))) if self.half_width > 0 else 3
+
+    @property
+    def estimate(self) -> str:
+        """Estimate with interval, as text; a wide interval as its two ends, and no interval if none is stated."""
+        if math.isnan(self.value):
+            return "no estimate"
         unit = f" {self.unit}" if self.unit else ""
-        parts = ", ".join(f"{name} {part:.{digits}f}" for name, part in self.shares.items())
+        if math.isnan(self.half_width):
+            return f"{self.value:.3g}{unit}"
+        digits = self._digits
         interval = f" ± {self.half_width:.{digits}f}{unit}"
         if self.half_width > _WIDE * self.value:
             interval = f", from {self.low:.{digits}f} to {self.high:.{digits}f}{unit}"
-        return f"{self.value:.{digits}f}{unit}{interval} ({parts}){self.note}"
+        return f"{self.value:.{digits}f}{unit}{interval}"
+
+    @property
+    def number(self) -> str:
+        """Estimate with interval, the contributions to the interval, and the note, as text."""
+        parts = ", ".join(f"{name} {part:.{self._digits}f}" for name, part in self.shares.items())
+        return self.estimate + ("" if math.isnan(self.half_width) else f" ({parts})") + self.note
 
 
 def answers_of(study: xr.Dataset) -> list[Answer]:
@@ -96,7 +110,7 @@ def answers_of(study: xr.Dataset) -> list[Answer]:
 
 def _answer(row: xr.Dataset) -> Answer:
     quantity, value = str(row["quantity"].item()), float(row["estimate"])
-    factor, unit = unit_words(quantity, value, str(row["units"].item()))
+    factor, unit = unit_words(quantity, 0.0 if math.isnan(value) else value, str(row["units"].item()))
     shares = {name: float(row[f"share_{name}"]) for name in ("seeds", "model", "refinement", "grid", "inputs")}
     known = {name: 0.0 if math.isnan(share) else share for name, share in shares.items()}
     causes = {"seeds": math.hypot(known["seeds"], known["refinement"])}
@@ -107,6 +121,9 @@ def _answer(row: xr.Dataset) -> Answer:
     if not math.isnan(shares["inputs"]):
         causes["inputs"] = known["inputs"]
     kind = str(row["stop_kind"].item())
+    notes = [str(row["left_out"].item()) if "left_out" in row else ""]  # not in results of earlier versions
+    if row["full_contact_seeds"]:
+        notes.append(f"full contact in {int(row['full_contact_seeds'])} of {int(row['fine_seeds'])} seeds")
     return Answer(
         f"{row['material'].item()} on {row['surface'].item()}, h'rms = {float(row['rms_slope']):.4g}",
         "" if kind == LOOP else state_words(kind, float(row["stop_target"])),
@@ -116,9 +133,7 @@ def _answer(row: xr.Dataset) -> Answer:
         float(row["estimate_high"]) * factor,
         unit,
         {name: share * value * factor for name, share in causes.items()},
-        f"; full contact in {int(row['full_contact_seeds'])} of {int(row['fine_seeds'])} seeds"
-        if row["full_contact_seeds"]
-        else "",
+        "".join(f"; {note}" for note in notes if note),
         _limit(row, shares),
     )
 
@@ -141,6 +156,8 @@ def state_words(kind: str, target: float) -> str:
 
 def _limit(row, shares):
     """Return a sentence on what limits the accuracy, and how the interval would narrow with twice as many seeds."""
+    if math.isnan(float(row["estimate_low"])):
+        return "The runs that are left out limit the accuracy."
     sources = {"asperity_seeds": "seeds", "coarse_seeds": "model", "fine_seeds": "refinement"}
     present = {level: int(row[level]) for level in sources if int(row[level])}
     cheapest, *others = present
@@ -207,7 +224,7 @@ def as_latex(answers: xr.DataTree) -> Iterator[str]:
         yield r"\begin{tabular}{llll}"
         yield r"\toprule contact & state & quantity & estimate \\ \midrule"
         for each in answers_of(node.to_dataset()):
-            number = each.number.partition(" (")[0].replace("%", r"\%").replace("±", r"$\pm$")
+            number = f"{each.estimate}{each.note}".replace("%", r"\%").replace("±", r"$\pm$")
             cells = [text.replace("_", r"\_").replace("'", "$'$") for text in (each.contact, each.state, each.quantity)]
             yield " & ".join([*cells, number]) + r" \\"
         yield r"\bottomrule"

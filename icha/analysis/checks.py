@@ -12,6 +12,7 @@ import xarray as xr
 from icha.asperity.cohesive_zone import MAX_STRENGTH_NUMBER
 from icha.checks.findings import IDENTITY_LIMIT, Check, Finding, compare_with_limit, count_not_finite
 from icha.checks.run import check_variables
+from icha.datasets.attributes import why_failed, why_no_result
 from icha.datasets.campaign import run_labels, variables_of_run
 from icha.datasets.labels import RunLabels
 from icha.datasets.variables.campaign import MISSING
@@ -49,12 +50,14 @@ def check_campaign(tree: xr.DataTree, expected: Iterable[RunLabels | tuple] | No
         checks.append(compare_with_limit("described", bare, 0, description, study))
     for labels in present:
         variables, attrs = variables_of_run(tree, labels)
-        # No result uses the values of a failed run, so these values are not checked.
-        if reason := attrs.get("incomplete") or attrs.get("failed_checks"):
+        if reason := why_failed(attrs):
             checks.append(Check(COMPLETED, 1.0, 0.0, False, reason, str(labels)))
-            continue
-        end = attrs.get("beyond_model", "the run reached the end of its path")
-        checks.append(Check(COMPLETED, 0.0, 0.0, True, end, str(labels)))
+            # No result uses the values of a failed run, so these values are not checked.
+            if why_no_result(attrs):
+                continue
+        else:
+            end = attrs.get("beyond_model", "the run reached the end of its path")
+            checks.append(Check(COMPLETED, 0.0, 0.0, True, end, str(labels)))
         if "beyond_model" in attrs and not variables["mean_separation"].size:
             continue  # no state was reached
         checks.extend(check_variables(variables, attrs, str(labels)))

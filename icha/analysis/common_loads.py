@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 from scipy.interpolate import PchipInterpolator
 
+from icha.analysis.left_out import too_few
 from icha.datasets.attributes import DERIVED, combine_attributes
 from icha.datasets.build import make_variable
 from icha.datasets.campaign import loading_stops, reduced_gap
@@ -86,7 +87,8 @@ def compare_runs(study: xr.Dataset) -> xr.Dataset:
     Incomplete runs (`status`) have no values and do not contribute to means. Runs that left the range of the model have
     values up to the limit of the model. Runs for which the asperity model is not applicable have values, but do not
     contribute to means. `seed_count` is the number of seeds in the means, `asked_seed_count` the number of requested
-    seeds. For a single seed, standard deviation and confidence interval are missing.
+    seeds. For a single seed, standard deviation and confidence interval are missing. The confidence interval is also
+    missing if more than a tenth of the requested seeds is (`icha.analysis.left_out`).
     """
     status = study["status"].transpose(*LABELS).values
     loaded, asked = np.isin(status, LOADED_RUNS), np.isin(status, (*COMPUTED_RUNS, MISSING))
@@ -105,7 +107,7 @@ def compare_runs(study: xr.Dataset) -> xr.Dataset:
         at, on_grid = _on_common_grid(study, load, loaded)
         coords[axis] = make_variable(TERMS[axis]._replace(dims=(axis,)), at)
         curves = {name: (Variable(LABELS, "1", study[name].attrs["long_name"]), on_grid[name]) for name in on_grid}
-        for name, (description, values) in (curves | _spreads(on_grid, averaged)).items():
+        for name, (description, values) in (curves | _spreads(on_grid, averaged, asked)).items():
             along = description._replace(
                 dims=(*description.dims, axis), long_name=f"{description.long_name}, at fixed {TERMS[axis].long_name}"
             )
@@ -147,13 +149,16 @@ def _on_common_grid(study, load, loaded):
     return at, on_grid
 
 
-def _spreads(on_grid, averaged):
+def _spreads(on_grid, averaged, asked):
     """Return descriptions and values of statistics over the seeds, and of ratios between materials or slopes."""
-    found = {}
+    found, seeds = {}, LABELS.index("seed")
+    stated = ~too_few(averaged.sum(axis=seeds), asked.sum(axis=seeds))[..., None]
     for name, short, symbol in _AVERAGED:
-        over_seeds = ensemble(np.where(averaged[..., None], on_grid[name], np.nan), LABELS.index("seed"))
+        over_seeds = ensemble(np.where(averaged[..., None], on_grid[name], np.nan), seeds)
+        over_seeds = over_seeds._replace(confidence=np.where(stated, over_seeds.confidence, np.nan))
         for part, words in _STATISTICS.items():
             missing = "where the mean contains no run" if part == "mean" else "where the mean contains a single seed"
+            missing += ", or too few of the requested seeds" if part == "confidence" else ""
             description = Variable(_WITHOUT_SEED, "1", words.format(symbol), further={"missing": missing})
             found[f"{short}_{part}"] = description, getattr(over_seeds, part)
     for label, many in (("material", "materials"), ("rms_slope", "rms slopes")):

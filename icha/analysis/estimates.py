@@ -8,18 +8,20 @@ for a few seeds are combined (`icha.analysis.control_variates`). The coarse runs
 import itertools
 import math
 from collections.abc import Iterator, Mapping
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from icha.analysis.control_variates import PROBABILITY, estimate_quantity
+from icha.analysis.left_out import NOT_POSITIVE, causes_of_runs, find_left_out, varied_parameters
 from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
 from icha.datasets.attributes import DERIVED, combine_attributes
 from icha.datasets.build import build_dataset, stack_rows
 from icha.datasets.campaign import loading_stops
 from icha.datasets.labels import LABELS, coarse_study, inputs_study, is_derived_study, slopes_at
 from icha.datasets.variables.answers import ANSWERS
-from icha.datasets.variables.campaign import COMPLETE, LOADED_RUNS
+from icha.datasets.variables.run import OF_LOSS
 from icha.path.targets import ESTIMATED_AT_TARGETS, ESTIMATED_OF_LOOPS, OF_SQUARES
 
 LOOP = "loop"
@@ -73,18 +75,18 @@ def _answers(
         values = {level: values_of(data, model, quantity, kind, target) for level, (data, model) in levels.items()}
         known = study[quantity].notnull().any([dim for dim in study[quantity].dims if dim != "surface"]).values
         areas = values_of(study, REFERENCE_MODEL, "contact_area_fraction", kind, target) if kind != LOOP else None
-        for surface, slope, material in itertools.product(*(range(study.sizes[dim]) for dim in CONTACT)):
-            if quantity in OF_SQUARES and not known[surface]:
+        for place in itertools.product(*(range(study.sizes[dim]) for dim in CONTACT)):
+            if quantity in OF_SQUARES and not known[place[0]]:
                 continue  # a periodic surface
-            by_seed = {level: _by_seed(of_level, surface, slope, material) for level, of_level in values.items()}
+            by_seed, left_out = _levels_at(values, place)
             if any(math.isinf(value) for level in by_seed.values() for value in level.values()):
                 continue  # the stiffness of full contact
             mean = estimate_quantity(by_seed["asperities"], by_seed["coarse"], by_seed["fine"])
-            if mean is None:
-                continue
-            found = mean.relative
-            share_inputs = _scatter_of_inputs(inputs, quantity, kind, target)
-            low, high = mean.interval(math.hypot(found.half_width, 0.0 if math.isnan(share_inputs) else share_inputs))
+            if mean is None and (left_out[-1].wanted < 2 or not any(each.words for each in left_out)):
+                continue  # the design has no interval
+            share_inputs, *of_cases = _scatter_of_inputs(inputs, quantity, kind, target)
+            left_out += of_cases
+            surface, slope, material = place
             yield {
                 "quantity": quantity,
                 "units": study[quantity].attrs["units"],
@@ -93,37 +95,92 @@ def _answers(
                 "material": str(study["material"].values[material]),
                 "stop_kind": kind,
                 "stop_target": target,
-                "estimate": mean.value,
-                "estimate_low": low,
-                "estimate_high": min(high, 1.0) if quantity == "contact_area_fraction" else high,
-                "share_seeds": found.scatter,
-                "share_model": found.model,
-                "share_refinement": found.refinement,
-                "share_grid": found.grid,
                 "share_inputs": share_inputs,
-                "asperity_coefficient": found.coefficient,
-                "degrees_of_freedom": found.freedom,
-                "geometric": int(mean.logarithmic),
+                **_estimate(quantity, mean, share_inputs, all(each.has_interval for each in left_out)),
                 "asperity_seeds": len(by_seed["asperities"]),
                 "coarse_seeds": len(by_seed["coarse"]),
                 "fine_seeds": len(by_seed["fine"]),
-                "full_contact_seeds": sum(area == 1 for area in _by_seed(areas, surface, slope, material).values()),
+                "full_contact_seeds": sum(area == 1 for area in _levels_at({"fine": areas}, place)[0]["fine"].values()),
+                "left_out": ". ".join(filter(None, (each.sentence for each in left_out))),
+                "biased": int(any(each.biased for each in left_out)),
             }
 
 
+def _estimate(quantity, mean, share_inputs, has_interval):
+    """Return the values of an estimate and its interval; NaN without an estimate or an interval."""
+    if mean is None:
+        nothing = ("estimate", "estimate_low", "estimate_high", "share_seeds", "share_model", "share_refinement")
+        nothing += ("share_grid", "asperity_coefficient", "degrees_of_freedom")
+        return dict.fromkeys(nothing, math.nan) | {"geometric": 0}
+    found = mean.relative
+    low, high = mean.interval(math.hypot(found.half_width, 0.0 if math.isnan(share_inputs) else share_inputs))
+    if quantity == "contact_area_fraction":
+        high = min(high, 1.0)
+    return {
+        "estimate": mean.value,
+        "estimate_low": low if has_interval else math.nan,
+        "estimate_high": high if has_interval else math.nan,
+        "share_seeds": found.scatter,
+        "share_model": found.model,
+        "share_refinement": found.refinement,
+        "share_grid": found.grid,
+        "asperity_coefficient": found.coefficient,
+        "degrees_of_freedom": found.freedom,
+        "geometric": int(mean.logarithmic),
+    }
+
+
+_SEEDS_OF = {
+    "asperities": "seeds of the asperity model",
+    "coarse": "seeds of boundary elements on half the grid",
+    "fine": "seeds of boundary elements",
+}
+
+
+def _levels_at(values, place):
+    """Return the values of a contact by level and seed, and the seeds that each level of the estimate leaves out.
+
+    A level uses only seeds that the cheaper levels also have; a level without any value is not part of the estimate.
+    """
+    by_seed, left_out, lacking = {}, [], {}
+    for level, of_level in values.items():
+        by_seed[level] = {}
+        if of_level is None:
+            continue
+        at = (slice(None), *place)
+        causes = {
+            seed: cause or lacking.get(seed, "")
+            for seed, cause in zip(of_level.seeds, of_level.causes[at].tolist(), strict=True)
+        }
+        found = zip(of_level.seeds, of_level.values[at].tolist(), strict=True)
+        by_seed[level] = {seed: float(value) for seed, value in found if not causes[seed]}
+        if by_seed[level] or level == "fine":
+            lacking = causes
+            left_out.append(find_left_out(_SEEDS_OF[level], list(causes.values())))
+    return by_seed, left_out
+
+
 def _scatter_of_inputs(inputs, quantity, kind, target):
-    """Return half the width of the interval that 90 % of the sampled cases are in, in the logarithm of a quantity."""
+    """Return half the width of the interval that 90 % of the sampled cases are in, in the logarithm of a quantity.
+
+    A second value describes the cases that are left out; there is no such value without sampled parameters.
+    """
     if inputs is None:
-        return math.nan
-    values = values_of(inputs, inputs["model"].values[0], quantity, kind, target)[0].astype(float)
+        return (math.nan,)
+    found = values_of(inputs, inputs["model"].values[0], quantity, kind, target)
+    values = found.values.astype(float)
+    causes = np.where((found.causes == "") & ~(values > 0), NOT_POSITIVE, found.causes)
+    left_out = find_left_out("sampled cases", causes.ravel(), varied_parameters(inputs.isel(model=0), DIMS))
     logarithms = np.log(values[np.isfinite(values) & (values > 0)])
     # With fewer cases, the quantiles would depend on one case alone.
     if len(logarithms) < 1 / (1 - PROBABILITY):
-        return math.nan
-    return float(np.diff(np.quantile(logarithms, [0.5 - PROBABILITY / 2, 0.5 + PROBABILITY / 2]))[0]) / 2
+        return math.nan, left_out
+    width = float(np.diff(np.quantile(logarithms, [0.5 - PROBABILITY / 2, 0.5 + PROBABILITY / 2]))[0])
+    return width / 2, left_out
 
 
 CONTACT = ("surface", "rms_slope", "material")
+DIMS = ("seed", *CONTACT)
 
 
 def stops_of(study):
@@ -133,23 +190,30 @@ def stops_of(study):
     return sorted({(str(kind), float(target)) for kind, target in zip(kinds, targets, strict=True)})
 
 
-def values_of(data, model, quantity, kind, target):
-    """Return the values of a quantity along seed, surface, slope and material, and the seeds; None without runs."""
+class Values(NamedTuple):
+    """Values of a quantity of all runs with one model.
+
+    Attributes
+    ----------
+    values : values along seed, surface, slope and material; NaN where a run has none.
+    causes : why a run has no value (`icha.analysis.left_out`), along the same dimensions; empty where it has one.
+    seeds : the seeds.
+    """
+
+    values: np.ndarray
+    causes: np.ndarray
+    seeds: list[int]
+
+
+def values_of(data, model, quantity, kind, target) -> Values | None:
+    """Return the values of a quantity at a target, or of the loop; None without runs."""
     if data is None or model not in data["model"].values or quantity not in data:
         return None
     runs = data.isel(model=data["model"].values.tolist().index(model))
-    usable = runs["status"].isin((COMPLETE,) if kind == LOOP else LOADED_RUNS) & (runs["applicability"] == "")
     values = runs[quantity]
     if kind != LOOP:
         same = np.isclose(runs["step_target"], target, rtol=1e-9, atol=0)
         values = values.where(loading_stops(runs) & (runs["step_kind"] == kind) & same).max("step")
-    return values.where(usable).transpose("seed", *CONTACT).values, data["seed"].values.tolist()
-
-
-def _by_seed(of_level, surface, slope, material):
-    """Return the values of a contact by seed, without seeds that have no result."""
-    if of_level is None:
-        return {}
-    values, seeds = of_level
-    column = values[:, surface, slope, material].astype(float)
-    return {seed: float(value) for seed, value in zip(seeds, column, strict=True) if not math.isnan(value)}
+    causes = causes_of_runs(runs, values, of_loss=quantity in OF_LOSS)
+    shown = (each.transpose(*DIMS).values for each in (values.where(causes == ""), causes))
+    return Values(*shown, data["seed"].values.tolist())

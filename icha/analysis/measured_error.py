@@ -3,7 +3,9 @@
 import numpy as np
 import xarray as xr
 
+from icha.analysis.left_out import NOT_COMPARED, NOT_REQUESTED, LeftOut, find_left_out
 from icha.analysis.validity import Statement
+from icha.datasets.variables.campaign import COMPLETE, NOT_IN_DESIGN
 from icha.datasets.variables.model_error import SHORT_RANGE
 
 _QUANTITIES = {"area_error": "contact area", "separation_error": "mean separation"}
@@ -26,10 +28,18 @@ def measured_errors(model_error: xr.DataTree) -> dict[str, Statement]:
         seeds = int(known.any([dim for dim in known.dims if dim != "seed"]).sum())
         loads = errors.sizes["reduced_pressure"]
         among = f"{seeds} {'seed' if seeds == 1 else 'seeds'}, {loads} {'load' if loads == 1 else 'loads'}"
+        among += f"; {words}" if (words := left_out_runs(errors).sentence) else ""
         found[name] = Statement(
             "error", f"of the asperity model in study {name}: {ranges} ({among}, boundary elements)"
         )
     return found
+
+
+def left_out_runs(errors: xr.Dataset) -> LeftOut:
+    """Describe the requested runs of an entry for which the models are not compared at any load."""
+    status = errors["status"].values.ravel()
+    causes = np.select([status == NOT_IN_DESIGN, status != COMPLETE], [NOT_REQUESTED, NOT_COMPARED], "")
+    return find_left_out("pairs of runs", causes)
 
 
 def _range(values: np.ndarray) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from icha.analysis.estimates import CONTACT, LOOP, stops_of, values_of
+from icha.analysis.left_out import INFINITE, NOT_POSITIVE, find_left_out
 from icha.analysis.polynomial_chaos import Expansion, expand
 from icha.datasets.attributes import DERIVED, combine_attributes
 from icha.datasets.build import build_dataset, stack_rows
@@ -40,14 +41,15 @@ def sensitivity_of_campaign(
 def _sensitivity(study, name, cases, parameters):
     """Return the dataset of one study."""
     stops = stops_of(study)
-    results = _results(study, cases, stops)
+    results, causes = _results(study, cases, stops)
     distributions = {key: Distribution(*of_parameter[1:4]) for key, of_parameter in parameters.items()}
     columns = {key: np.array(of_parameter[4]) for key, of_parameter in parameters.items()}
     points = np.column_stack([each.standardise(columns[key]) for key, each in distributions.items()])
     levels = np.linspace(_TAIL, 1 - _TAIL, _NODES)
     nodes = np.array([each.quantile(levels) for each in distributions.values()])
     models, kinds = study["model"].values.tolist(), [kind for kind, _ in stops]
-    rows = list(_responses(models, kinds, results, points, list(distributions.values()), nodes))
+    sampled = {key: (of_parameter[0], columns[key]) for key, of_parameter in parameters.items()}
+    rows = list(_responses(models, kinds, results, causes, sampled, points, list(distributions.values()), nodes))
     sizes = {"parameter": len(parameters), "node": _NODES}
     values = stack_rows(SENSITIVITY, rows, "response", sizes) if rows else {}
     values |= (
@@ -85,28 +87,29 @@ def _attributes(name, of_parameter):
     }
 
 
-def _results(study: xr.Dataset, cases: Sequence[tuple], stops: Sequence[tuple]) -> dict[str, np.ndarray]:
-    """Return each quantity of each case, with NaN where a run has no result."""
+def _results(
+    study: xr.Dataset, cases: Sequence[tuple], stops: Sequence[tuple]
+) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Return each quantity of each case, with NaN where a run has no result, and why a run has no result."""
     places = [place_of(study, dict(zip(CONTACT, case, strict=True))) for case in cases]
     index = tuple(np.array([place[label] for place in places]) for label in CONTACT)
-    found = {}
+    values, causes = {}, {}
     for quantity in (*ESTIMATED_AT_TARGETS, *ESTIMATED_OF_LOOPS):
         if quantity not in study:
             continue
         of_loop = quantity in ESTIMATED_OF_LOOPS
-        columns = [
-            [
-                values_of(study, model, quantity, kind, target)[0][:, *index].astype(float)
-                for kind, target in ([(LOOP, 0.0)] if of_loop else stops)
-            ]
+        found = [
+            [values_of(study, model, quantity, kind, target) for kind, target in ([(LOOP, 0.0)] if of_loop else stops)]
             for model in study["model"].values
         ]
-        values = np.moveaxis(np.array(columns), 1, -1)
-        found[quantity] = values[..., 0] if of_loop else values
-    return found
+        for arrays, name, dtype in ((values, "values", float), (causes, "causes", object)):
+            columns = [[getattr(each, name)[:, *index].astype(dtype) for each in row] for row in found]
+            column = np.moveaxis(np.array(columns), 1, -1)
+            arrays[quantity] = column[..., 0] if of_loop else column
+    return values, causes
 
 
-def _responses(models, kinds, results, points, distributions, nodes) -> Iterator[dict]:
+def _responses(models, kinds, results, causes, sampled, points, distributions, nodes) -> Iterator[dict]:
     """Yield a row for each model, quantity and target with results: statistics and indices over the cases."""
     normal = [each.is_normal for each in distributions]
     at = np.array([each.standardise(row) for each, row in zip(distributions, nodes, strict=True)])
@@ -115,9 +118,13 @@ def _responses(models, kinds, results, points, distributions, nodes) -> Iterator
         for target in targets:
             if target >= 0 and kinds[target] in ESTIMATED_AT_TARGETS[quantity]:
                 continue  # prescribed
-            column = values[m] if target < 0 else values[m, ..., target]
+            column, why = (each[m] if target < 0 else each[m, ..., target] for each in (values, causes[quantity]))
             # The logarithm of zero contact area, for example, is not finite.
-            known = (np.isfinite(column) & (column > 0)).all(axis=0)
+            why = np.where((why == "") & np.isinf(column), INFINITE, why)
+            why = np.where((why == "") & ~(column > 0), NOT_POSITIVE, why)
+            # A case counts if all its seeds have a result.
+            left_out = find_left_out("cases", [next(filter(None, seeds), "") for seeds in why.T], sampled)
+            known = (why == "").all(axis=0)
             if not known.any():
                 continue
             logarithms = np.log(column[:, known]).mean(axis=0)
@@ -128,18 +135,21 @@ def _responses(models, kinds, results, points, distributions, nodes) -> Iterator
                 "response_quantity": quantity,
                 "response_target": target,
                 "case_count": int(known.sum()),
+                "left_out": left_out.sentence,
+                "biased": int(left_out.biased),
                 "middle": math.exp(logarithms.mean()),
-                "low": low,
-                "high": high,
-            } | _indices(found, at, normal)
+                "low": low if left_out.has_interval else math.nan,
+                "high": high if left_out.has_interval else math.nan,
+            } | _indices(found, at, normal, has_interval=left_out.has_interval)
 
 
-def _indices(found: Expansion | None, at, normal):
-    """Return the indices and main effects of a fitted polynomial; NaN without polynomial."""
+def _indices(found: Expansion | None, at, normal, *, has_interval):
+    """Return indices and main effects of a fitted polynomial; NaN without polynomial, half-widths also if biased."""
     names = ("first_order", "total_order", "first_order_half_width", "total_order_half_width")
     if found is None:
         nothing = dict.fromkeys(names, np.full(len(at), np.nan))
         return nothing | {"degree": 0, "unexplained": np.nan, "main_effect": np.full(at.shape, np.nan)}
-    indices = dict(zip(names, (*found.indices(found.coefficients), *found.half_widths()), strict=True))
+    widths = found.half_widths() if has_interval else (np.full(len(at), np.nan),) * 2
+    indices = dict(zip(names, (*found.indices(found.coefficients), *widths), strict=True))
     effects = [found.main_effect(k, row, normal=normal[k]) for k, row in enumerate(at)]
     return indices | {"degree": found.degree, "unexplained": found.error, "main_effect": np.exp(effects)}

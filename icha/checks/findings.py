@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,6 +12,21 @@ IDENTITY_LIMIT = 1e-8
 
 # Name, value, limit and description of a check.
 Finding = tuple[str, float, float, str]
+# Values of a run that are not valid if the run fails a check: all values, or only those of the hysteresis loss.
+EVERYTHING, LOSS = "everything", "loss"
+
+
+class Definition(NamedTuple):
+    """Definition of a check.
+
+    Attributes
+    ----------
+    description : meaning of the value of the check.
+    invalidates : EVERYTHING or LOSS, the values of a run that fails the check that are not valid.
+    """
+
+    description: str
+    invalidates: str = EVERYTHING
 
 
 @dataclass(frozen=True)
@@ -25,6 +41,7 @@ class Check:
     passed : whether the value is finite and at most the limit.
     description : meaning of the value.
     subject : name of the run.
+    invalidates : values of a failed run that are not valid, as in `Definition`.
     """
 
     name: str
@@ -33,6 +50,7 @@ class Check:
     passed: bool
     description: str
     subject: str = ""
+    invalidates: str = EVERYTHING
 
 
 @dataclass(frozen=True)
@@ -57,8 +75,11 @@ def count_not_finite(arrays: Iterable[np.ndarray]) -> int:
     return sum(int(np.count_nonzero(~np.isfinite(values))) for values in arrays if values.dtype.kind in "fiu")
 
 
-def compare_with_limit(name: str, value: float, limit: float, description: str, subject: str) -> Check:
+def compare_with_limit(
+    name: str, value: float, limit: float, description: str, subject: str, invalidates: str = EVERYTHING
+) -> Check:
     """Return the check that a value is finite and at most its limit."""
     value = float(value)
     finite = math.isfinite(value)
-    return Check(name, value if finite else -1.0, float(limit), bool(finite and value <= limit), description, subject)
+    passed = bool(finite and value <= limit)
+    return Check(name, value if finite else -1.0, float(limit), passed, description, subject, invalidates)

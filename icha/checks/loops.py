@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from icha.checks.findings import IDENTITY_LIMIT
+from icha.checks.findings import IDENTITY_LIMIT, LOSS, Definition
 from icha.contact.models import RESIDUAL_TOLERANCE, model_of
 from icha.path.energy_balance import event_error, integration_error, pressure_jump
 from icha.path.targets import EVENT_ERROR_OVER_LOSS
@@ -25,9 +25,9 @@ CELL_CLOSURE_LIMIT = 1e-4
 # nearly conserves energy: without adhesion, loops close within a few hundredths of a per cent (docs/hysteresis.md).
 UNION_LIMIT = 1e-3
 
-# Meanings of the checks by name.
-LOOP_CHECKS = {
-    "events": "number of events that are only in the counts of events or only in the list of events",
+# Energies of a loop are differences of works. A run whose energies are wrong keeps its pull-off, areas and gaps, which
+# are those of equilibria.
+_ENERGIES = {
     "loss adds up": "difference between the hysteresis loss and the sum of its parts, divided by the largest work",
     "loss is the work": "difference between the hysteresis loss and the work of the loop, divided by the largest work",
     "loop loses energy": "energy gained in the whole loop, divided by the largest work",
@@ -35,12 +35,18 @@ LOOP_CHECKS = {
     "jumps off lose energy": "energy gained in jumps out of contact, divided by the largest work",
     "unions lose energy": "energy gained in coalescence and splitting of spots, divided by the largest work",
     "load jumps lose energy": "energy gained in jumps at constant load, divided by the largest work",
+    "loop closes": "hysteresis loss divided by largest work; must be zero without adhesion and coalescence",
+}
+_STATES = {
+    "events": "number of events that are only in the counts of events or only in the list of events",
     "separated: spots": "number of spots left in contact at the end of unloading",
     "separated: pressure": "nominal pressure left at the end of unloading, in Pa",
     "pull-off pressure": "difference between the pull-off pressure and the largest tension of the last unloading, "
     "divided by the largest pressure of this unloading",
-    "loop closes": "hysteresis loss divided by largest work; must be zero without adhesion and coalescence",
 }
+# Definitions of the checks by name.
+LOOP_CHECKS = {name: Definition(words) for name, words in _STATES.items()}
+LOOP_CHECKS |= {name: Definition(words, invalidates=LOSS) for name, words in _ENERGIES.items()}
 
 
 def check_events(run) -> Iterator[tuple]:

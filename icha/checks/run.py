@@ -6,7 +6,15 @@ from collections.abc import Hashable, Iterable, Iterator, Mapping
 import numpy as np
 import xarray as xr
 
-from icha.checks.findings import IDENTITY_LIMIT, Check, RunArrays, compare_with_limit, count_not_finite
+from icha.checks.findings import (
+    EVERYTHING,
+    IDENTITY_LIMIT,
+    Check,
+    Definition,
+    RunArrays,
+    compare_with_limit,
+    count_not_finite,
+)
 from icha.checks.loops import LOOP_CHECKS, check_events, check_loop, finite_stiffness
 from icha.contact.models import AREA_TOLERANCE_CELLS, AREA_TOLERANCE_PART, SMALLEST_LOAD, model_of
 from icha.datasets.variables.run import INDENTER, OF_MODELS, RUN
@@ -29,8 +37,7 @@ _MAY_BE_INFINITE = {
     name for name, description in (RUN | OF_MODELS | INDENTER).items() if INFINITE in description.further
 }
 
-# Meanings of the checks by name.
-_CHECKS = LOOP_CHECKS | {
+_OF_STATES = {
     "finite": "number of values that are not finite",
     "steps": "1 if the run has no steps, otherwise 0",
     "residual": "largest equilibrium error divided by h_rms",
@@ -52,6 +59,8 @@ _CHECKS = LOOP_CHECKS | {
     "area of spots": "relative difference between the sum of the areas of spots and A/A0",
     "load of spots": "difference between the sum of the forces of spots and F, divided by compression plus tension",
 }
+# Definitions of the checks by name.
+_CHECKS = LOOP_CHECKS | {name: Definition(words) for name, words in _OF_STATES.items()}
 
 
 def check_run(run: xr.Dataset, subject: str = "") -> tuple[Check, ...]:
@@ -66,7 +75,10 @@ def check_variables(
     values = {str(name): variable.values for name, variable in variables.items()}
     sizes = {str(dim): size for variable in variables.values() for dim, size in variable.sizes.items()}
     findings = _check(RunArrays(values, sizes, attrs))
-    return tuple(compare_with_limit(name, value, limit, _CHECKS[name], subject) for name, value, limit in findings)
+    return tuple(
+        compare_with_limit(name, value, limit, _CHECKS[name].description, subject, _CHECKS[name].invalidates)
+        for name, value, limit in findings
+    )
 
 
 def _check(run: RunArrays) -> Iterator[tuple]:
@@ -233,10 +245,17 @@ def _identity_errors(run):
     yield "load of spots", np.max(np.abs(spot_load - pressure) / load_scale)
 
 
-def reasons_of_failure(checks: Iterable[Check]) -> str:
-    """Return the failed checks as one line of text; return an empty text if all checks have passed."""
-    return "; ".join(
-        f"{check.name}: {check.value:.3g} ({check.description}); expected at most {check.limit:.3g}"
-        for check in checks
-        if not check.passed
+def attributes_of_failure(checks: Iterable[Check]) -> dict[str, str]:
+    """Return the attribute of a run that names its failed checks in one line; no attribute if all checks have passed.
+
+    The attribute is `failed_loss_checks` if only the values of the hysteresis loss are not valid, and `failed_checks`
+    otherwise.
+    """
+    failed = [check for check in checks if not check.passed]
+    if not failed:
+        return {}
+    reasons = (
+        f"{check.name}: {check.value:.3g} ({check.description}); expected at most {check.limit:.3g}" for check in failed
     )
+    whole = any(check.invalidates == EVERYTHING for check in failed)
+    return {"failed_checks" if whole else "failed_loss_checks": "; ".join(reasons)}

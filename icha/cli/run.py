@@ -113,28 +113,33 @@ def run(
         _print_validity(expected_validity(campaign))
 
     def compute(campaign, targets):
-        """Compute targets with Snakemake, and print the outcome."""
+        """Compute targets with Snakemake, and print the outcome; return whether all checks passed."""
         from icha.planning.plan import plan
 
         items = plan(campaign, results)
         if not anyway:
             _refuse_if_too_large(items, targets, cores or DEFAULT_CORES, results, read_profile(profile_folder))
-        _compute([*program, *targets, *options, "--logger", "icha"], workflow, folder, campaign, items)
+        return _compute([*program, *targets, *options, "--logger", "icha"], workflow, folder, campaign, items)
 
     choices = {}
     if every:
         campaign, choices = _reach_accuracy(campaign, path, folder, cores or DEFAULT_CORES, compute)
-    compute(campaign, targets)
+    passed = compute(campaign, targets)
     if every:
         _print_checks(campaign, results)
         _print_accuracy(choices)
+    if not passed:
+        raise typer.Exit(FAILED)
     if "publish" in targets:
         version = campaign.deposit_metadata().version
         echo(f"deposit: {shorten_path(results / 'publish' / f'{campaign.name}-{version}.zip')}")
 
 
-def _compute(command: list[str], workflow: Path, folder: Path, campaign, items) -> None:
-    """Run a command of Snakemake, show its progress and print its outcome; after a failure, exit."""
+def _compute(command: list[str], workflow: Path, folder: Path, campaign, items) -> bool:
+    """Run a command of Snakemake, show its progress and print its outcome; after a failure, exit.
+
+    Return True if no job failed, and False if only the verdict did: then all results exist, without the failed runs.
+    """
     from rich.console import Console
 
     from icha.cli.live import Progress, View
@@ -146,8 +151,9 @@ def _compute(command: list[str], workflow: Path, folder: Path, campaign, items) 
     log = _log_file(folder, campaign.name)
     status, stopped = _run_snakemake(command, workflow, log, progress, view)
     _print_outcome(status, stopped, progress, campaign, folder, log)
-    if status:
+    if status and (stopped or {job.rule for job in progress.failed} != {"verdict"}):
         raise typer.Exit(FAILED)
+    return not status
 
 
 # Largest number of times that the seeds of a study are increased to reach its accuracy.
@@ -167,8 +173,11 @@ def _reach_accuracy(campaign, path: Path, folder: Path, cores: int, compute):
     results, choices = folder / "results" / campaign.name, {}
     if all(study.accuracy is None for study in campaign.studies.values()):
         return campaign, choices
+    from icha.planning.results import campaign_files
+
     for extension in range(_MOST_EXTENSIONS + 1):
-        compute(campaign, ["dataset"])
+        # The target `dataset` includes the verdict, which one failed run is enough to stop.
+        compute(campaign, ["runs", f"results/{campaign.name}/{campaign_files(campaign).dataset}"])
         choices = choose_levels(campaign, results, cores)
         extended = {name: choice for name, choice in choices.items() if choice.counts}
         if not extended or extension == _MOST_EXTENSIONS:
@@ -202,7 +211,7 @@ def _refuse_if_too_large(items, targets: list[str], cores: int, results: Path, p
     """Raise `UserError` if memory or disk space is probably too small."""
     from icha.planning.requirements import find_shortages
 
-    if any(target.startswith("results/") for target in targets):
+    if targets and all(target.startswith("results/") for target in targets):
         return  # the cost of single files is unknown
     # Resources on the command line have priority over resources in the profile.
     resources = [each for each in targets if "=" in each] + profile.get("resources", [])
@@ -369,14 +378,14 @@ def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path,
 
 
 def _print_failures(status: int, stopped: bool, progress, campaign, folder: Path, log: Path) -> None:
-    """Print the failed jobs, and the runs without a result, with the reason for each failure."""
+    """Print the failed jobs and the failed runs, with the reason for each failure."""
     from icha.cli.live import read_error
     from icha.planning.plan import early_ends
 
     results = folder / "results" / campaign.name
     incomplete, ended = early_ends(campaign, results)
     if status or campaign.publication.known_failures:
-        _print_early_ends("without a result", incomplete, campaign, results / "logs/failed_runs.txt", "red")
+        _print_early_ends("failed", incomplete, campaign, results / "logs/failed_runs.txt", "red")
     what = "ended before the last target, as physics decides"
     _print_early_ends(what, ended, campaign, results / "logs/ended_runs.txt")
     incomplete = [case.path for case in incomplete]
@@ -384,7 +393,7 @@ def _print_failures(status: int, stopped: bool, progress, campaign, folder: Path
     if failed:
         echo(f"{format_count(len(failed), 'job')} failed:", fg="red")
         for job in failed:
-            # The message of the job "Verdict on the checks" repeats the runs without a result, which are printed above.
+            # The message of the job "Verdict on the checks" repeats the failed runs, which are printed above.
             reason = [line for line in read_error(job, folder) if not any(line.startswith(path) for path in incomplete)]
             unknown = f"the job ended without a message, perhaps for lack of memory; see {job.log or log}"
             _print_failure(f"  {job.title}", reason or [unknown], bold=True)

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from icha.cli.project import UserError, echo, option
-from icha.datasets.attributes import reasons_not_applicable, why_no_result
+from icha.datasets.attributes import reasons_not_applicable, why_failed
 from icha.support.formatting import format_count, format_quantity, printable
 
 MOST_ROWS = 12  # largest number of rows in the table of steps
@@ -79,7 +79,7 @@ def _print_run(run, file: Path) -> None:
         f"surface:  period {quantity('period', 'm')}, rms slope {float(run['rms_slope']):.4g}, rms height "
         f"{quantity('rms_height', 'm')}, seed {int(run['seed'])}, {int(run['asperity_count'])} asperities"
     )
-    if reason := why_no_result(run.attrs):
+    if reason := why_failed(run.attrs):
         echo(f"failed:   {printable(reason)}", fg="red")
     if reason := run.attrs.get("applicability"):
         echo(f"warning:  {printable(reason)}", fg="red")
@@ -151,6 +151,7 @@ def _print_surface(surface, file: Path) -> None:
 
 def _print_campaign(tree, file: Path) -> None:
     """Print, for each study of a campaign, its size, models, ranges of results and failed runs."""
+    from icha.analysis.left_out import left_out_of_study
     from icha.datasets.campaign import run_place, runs_of_status
     from icha.datasets.labels import LABELS, labels_at
     from icha.datasets.variables.campaign import BEYOND_MODEL, LOADED_RUNS
@@ -166,8 +167,11 @@ def _print_campaign(tree, file: Path) -> None:
         counts = ", ".join(f"{number} {meaning}" for meaning, number in numbers.items() if number)
         echo(f"\n{printable(f'{name}: {sizes}; {counts}')}")
         echo(f"  models {printable(', '.join(study['model'].values))}")
+        if sentence := left_out_of_study(study).sentence:
+            echo(f"  results are of {sentence}", fg="red")
+        results = study[["contact_area_fraction", "reduced_pressure"]].where(study["status"].isin(LOADED_RUNS))
         for label, variable in (("A/A0", "contact_area_fraction"), ("p*", "reduced_pressure")):
-            values = study[variable].values
+            values = results[variable].values
             if (known := values[values == values]).size:
                 echo(f"  {label:<6} {known.min():.3g} to {known.max():.3g}")
         if "pull_off_force" in study:

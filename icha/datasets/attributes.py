@@ -27,6 +27,11 @@ def why_no_result(attrs: Mapping) -> str:
     return str(attrs.get("incomplete") or attrs.get("failed_checks", ""))
 
 
+def why_failed(attrs: Mapping) -> str:
+    """Return the reason why a run failed, including failed checks of the loss, which leave the other results valid."""
+    return why_no_result(attrs) or str(attrs.get("failed_loss_checks", ""))
+
+
 def reasons_not_applicable(study: Mapping) -> Counter[str]:
     """Return the number of runs of a study for each reason why the asperity model is not applicable."""
     return Counter(filter(None, study["applicability"].values.ravel().astype(str).tolist()))

@@ -14,13 +14,14 @@ from icha.datasets.labels import LABELS, RunLabels, labels_at, place_of, slopes_
 from icha.datasets.variables.campaign import (
     BEYOND_MODEL,
     COMPUTED_RUNS,
+    FAILED_LOSS,
     INCOMPLETE,
     MISSING,
     NOT_IN_DESIGN,
     RAGGED,
     STATUS_ATTRIBUTES,
 )
-from icha.datasets.variables.run import FURTHER, INDENTER
+from icha.datasets.variables.run import FURTHER, INDENTER, OF_LOSS
 from icha.path.targets import BETWEEN
 
 # Variables of the campaign dataset that describe a run; datasets of runs do not have these variables.
@@ -77,7 +78,8 @@ def select_run(tree: xr.DataTree, labels: RunLabels | tuple) -> xr.Dataset:
 
     The returned dataset has the attributes of the file of the run. Some attributes explain the status of the run:
     `incomplete` (why the run failed), `beyond_model` (why the run ended at the limit of the model), `failed_checks`
-    (which checks failed), and `applicability` (why the model is not applicable).
+    (which checks failed), `failed_loss_checks` (which checks of the loss failed; the run then has no variables of the
+    loss), and `applicability` (why the model is not applicable).
 
     Raises
     ------
@@ -109,6 +111,7 @@ def variables_of_run(tree: xr.DataTree, labels: RunLabels | tuple) -> tuple[dict
         index["snapshot"] = np.flatnonzero(np.isfinite(overlap))
     left_out = {*_OF_EVERY_CAMPAIGN, "applicability", *(f"{dim}_{label}" for dim in RAGGED for label in LABELS)}
     left_out |= {name for model, names in FURTHER.items() if model != labels.model for name in names}
+    left_out |= OF_LOSS if int(status) == FAILED_LOSS else set()
     variables = {}
     for name, of_study in study.variables.items():
         if name in left_out:

@@ -25,6 +25,7 @@ from icha.datasets.variables.campaign import (
     STATUS_ATTRIBUTES,
     VARIES_WITH,
     VARIES_WITH_SHAPES,
+    WHOLE_RUNS,
 )
 from icha.datasets.variables.run import CELLS, CYCLE, INDENTER, LOOP, OF_MODELS, RUN
 from icha.support.input_files import text
@@ -276,7 +277,7 @@ def _arrange_study(name: str, found: dict[RunLabels, Entry], design: list[RunLab
 
     outcomes = [
         (INCOMPLETE, f"{len(entry.snapshots)} of {len(snapshots)} snapshots")
-        if entry.status in (COMPLETE, FAILED_CHECKS) and len(entry.snapshots) != len(snapshots)
+        if entry.status in (*WHOLE_RUNS, FAILED_CHECKS) and len(entry.snapshots) != len(snapshots)
         else (entry.status, entry.failure)
         for entry in entries
     ]

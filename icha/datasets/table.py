@@ -43,7 +43,7 @@ def name_and_unit(column: str) -> tuple[str, str]:
 
 
 def tidy_table(campaign: xr.DataTree) -> pd.DataFrame:
-    """Return a table of all targets that the runs of a campaign reached.
+    """Return a table of all targets that the runs of a campaign reached; a run that reached none has one row.
 
     The columns are: study and labels of the run; varied parameters; status of the run; number, branch and target of the
     step; all quantities of the step; all quantities of the run. Names of columns end in the unit, if the unit is not 1.
@@ -80,8 +80,9 @@ def _study_table(campaign, name):
                 of_steps[named] = variable.values[targets]
             else:
                 of_run[named] = variable.values.item()
-        if len(targets):
-            frames.append(pd.DataFrame(columns | of_steps | of_run))
+        if not len(targets):
+            of_steps = {named: [np.nan] for named in of_steps}
+        frames.append(pd.DataFrame(columns | of_steps | of_run, index=range(max(len(targets), 1))))
     return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame({"study": []})
 
 

@@ -20,8 +20,7 @@ from icha.datasets.campaign import run_place, runs_of_status
 from icha.datasets.labels import LABELS, slopes_of
 from icha.datasets.variables.campaign import (
     BEYOND_MODEL,
-    FAILED_CHECKS,
-    INCOMPLETE,
+    FAILED_RUNS,
     LOADED_RUNS,
     NOT_IN_DESIGN,
     STATUS_MEANINGS,
@@ -135,7 +134,7 @@ def _outcome(publication: Publication, dataset: xr.DataTree, checks: Sequence[Ch
         status = {text: counts[k] for k, text in enumerate(STATUS_MEANINGS)}
         designs.append({"name": name, "status": status, "runs": counts.total() - counts[NOT_IN_DESIGN], **axes})
         complete += runs_of_status(study, name, LOADED_RUNS)
-        for labels in runs_of_status(study, name, (INCOMPLETE, FAILED_CHECKS)):
+        for labels in runs_of_status(study, name, FAILED_RUNS):
             run = study[["step_count", "failure"]].isel(run_place(study, labels))
             facts = {"steps": int(run["step_count"]), "failure": run["failure"].item()}
             incomplete.append({"labels": labels, "reason": known.get(str(labels), ""), **facts})

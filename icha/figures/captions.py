@@ -16,7 +16,6 @@ from icha.datasets.labels import LABELS, slopes_of
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
 
 if TYPE_CHECKING:
-    import xarray as xr
     from matplotlib.figure import Figure
 
 
@@ -72,25 +71,36 @@ def texts_of(figure: Figure, data: Mapping[str, object], studies: Sequence[str])
     return "\n".join(words + (["at finite range"] if FINITE_RANGE in truths else []))
 
 
-def count_runs(campaign: xr.DataTree, studies: Sequence[str]) -> str:
-    """Count the missing runs and the runs that are drawn pale, in sentences for the end of a caption.
+def count_runs(data: Mapping[str, object], studies: Sequence[str], shown: str = "") -> str:
+    """Count the runs that a figure leaves out or draws pale, in sentences for the end of its caption; often empty.
 
-    The text is empty if no run is missing and no run is drawn pale.
+    Parameters
+    ----------
+    data : datasets of the figure, by name.
+    studies : names of the studies whose runs the figure shows.
+    shown : lines that tell what the figure shows, from `texts_of`.
     """
-    from icha.datasets.variables.campaign import COMPLETE, COMPUTED_RUNS, FAILED_CHECKS, INCOMPLETE, MISSING
+    from icha.analysis.left_out import left_out_of_study
+    from icha.analysis.sample_words import left_out_lines, sample_rows
+    from icha.datasets.variables.campaign import LOADED_RUNS
 
     found: list[str] = []
     for name in studies:
-        if name not in campaign.children:
+        if name in getattr(data.get("sensitivity"), "children", ()):
+            found += [f"{line}." for line in left_out_lines(sample_rows(data["sensitivity"][name].to_dataset()))]
+        if name not in getattr(data.get("campaign"), "children", ()):
             continue
-        study, suffix = campaign[name].to_dataset(), f" of study {name}" if len(studies) > 1 else ""
-        status = study["status"].transpose(*LABELS).values
-        asked = np.count_nonzero(np.isin(status, (*COMPUTED_RUNS, MISSING)))
-        for words, states in (("did not complete", (INCOMPLETE, MISSING)), ("failed their checks", (FAILED_CHECKS,))):
-            if count := np.count_nonzero(np.isin(status, states)):
-                found.append(f"{count} of {asked} runs{suffix} {words}; see the section Failed runs.")
+        study, suffix = data["campaign"][name].to_dataset(), f" in study {name}" if len(studies) > 1 else ""
+        left_out = left_out_of_study(study, of_loss="loss" in shown)
+        if left_out.words:
+            biased = "; the others are a biased selection" if left_out.biased else ""
+            found.append(
+                f"The figure shows {left_out.words}{suffix}{biased}. Means over too few of the requested seeds have no "
+                "intervals. The report lists the reasons."
+            )
         if "applicability" in study:  # not in campaigns of earlier versions
-            reasons = study["applicability"].transpose(*LABELS).values[status == COMPLETE]
+            status = study["status"].transpose(*LABELS).values
+            reasons = study["applicability"].transpose(*LABELS).values[np.isin(status, LOADED_RUNS)]
             for reason, count in Counter(filter(None, map(str, reasons))).items():
                 found.append(f"Note on {count} {'run' if count == 1 else 'runs'}{suffix}: {reason}.")
     return " ".join(found)

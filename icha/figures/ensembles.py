@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from icha.analysis.left_out import too_few
 from icha.figures.looks import FEWER_SEEDS
 from icha.figures.select import ContactRuns
 from icha.figures.style import GREY, legend_handle
@@ -53,7 +54,7 @@ def draw_members(
     mean, known = ensemble(members).mean, np.isfinite(members)
     scattered = len(members) > 1 and (len(members) >= ENOUGH or curves <= MOST_SCATTERED)
     if scattered:
-        _draw_scatter(axes, x, members, look["color"], positive=positive)
+        _draw_scatter(axes, x, members, look["color"], positive=positive, asked=asked)
     every = max(1, -(-len(x) // _MEAN_MARKERS))
     axes.plot(*_break_lines(known, x, mean), **{"lw": 0.9} | look | {"ls": "-", "markevery": every})
     mark_fewer(axes, x, mean, known, look, asked, every)
@@ -86,8 +87,11 @@ def mark_fewer(
         axes.plot(x, np.where(fewer, y, np.nan), markevery=every, **mark, **_CROSS)
 
 
-def _draw_scatter(axes, x, members, colour, *, positive):
-    """Draw a confidence band, or every member if members are few; the band does not change the limits of the axes."""
+def _draw_scatter(axes, x, members, colour, *, positive, asked):
+    """Draw a confidence band, or every member if members are few; the band does not change the limits of the axes.
+
+    There is no band where too many of the `asked` members are missing.
+    """
     over = ensemble(members)
     if over.count.min(initial=len(members)) < ENOUGH:
         # A line with a single point would be invisible.
@@ -96,7 +100,8 @@ def _draw_scatter(axes, x, members, colour, *, positive):
             axes.plot(x, np.where(member > 0, member, np.nan) if positive else member, color=colour, **look)
         return
     limits = axes.dataLim.frozen()
-    band = _break_lines(np.isfinite(members), x, *over.band(positive=positive))
+    stated = ~too_few(over.count, asked)
+    band = _break_lines(np.isfinite(members), x, *np.where(stated, over.band(positive=positive), np.nan))
     axes.fill_between(*band, color=colour, alpha=0.18, lw=0, zorder=1.5)
     axes.dataLim.set(limits)
 
@@ -147,7 +152,7 @@ def draw_points(
     known, over = np.isfinite(members), ensemble(members)
     x = np.where(known, x, np.nan)
     several, few = over.count > 1, (over.count > 1) & (over.count < ENOUGH)
-    ends = np.array(over.band(positive=positive))
+    ends = np.where(too_few(over.count, asked), np.nan, over.band(positive=positive))
     if few.any():
         ends[:, few] = np.nanmin(members[:, few], axis=0), np.nanmax(members[:, few], axis=0)
     x, bars = ensemble(x).mean, np.where(several, [over.mean - ends[0], ends[1] - over.mean], np.nan)

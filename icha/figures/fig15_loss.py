@@ -70,7 +70,7 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
     from matplotlib.patches import Patch
 
     studies = list(dict.fromkeys(studies))
-    runs = select_detached_lines(campaign, studies, both_models=True)
+    runs = select_detached_lines(campaign, studies, quantity="hysteresis_loss", both_models=True)
     sticky = {key: line for key, line in runs.items() if line[0].surface_energy > 0}
     if not sticky:
         raise NothingToDraw(f"studies {', '.join(studies)}: no run with adhesion; the figure needs a surface energy")

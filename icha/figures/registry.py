@@ -15,7 +15,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import icha.figures
-from icha.figures.captions import caption_of, texts_of
+from icha.figures.captions import caption_of, count_runs, texts_of
 from icha.figures.declaration import Declaration
 from icha.figures.own_figure import caption_in
 from icha.figures.style import GREY, in_style, new_figure, save
@@ -77,16 +77,18 @@ def draw_figure(
     from icha.figures.select import NothingToDraw
 
     data = {argument: _read(files) for argument, files in inputs.items()}
+    shown = ""
     try:
         figure = figure_module(name).figure(**data, **arguments)
-        caption = caption_in(data["script"]) if "script" in data else caption_of(name, texts_of(figure, data, studies))
+        shown = texts_of(figure, data, studies)
+        caption = caption_in(data["script"]) if "script" in data else caption_of(name, shown)
     except NothingToDraw as reason:
         caption = f"Nothing to draw: {reason}."
         print(caption)
         figure = _empty_page(str(reason))
     save(figure, png, pdf)
     with whole_file(text) as temporary:
-        temporary.write_text(f"{caption}\n", encoding="utf-8")
+        temporary.write_text(f"{caption} {count_runs(data, studies, shown)}".strip() + "\n", encoding="utf-8")
 
 
 def _read(files):

@@ -137,10 +137,10 @@ def select_by_labels(
 def select_complete_run(campaign: xr.DataTree, labels: RunLabels) -> xr.Dataset:
     """Return a run of the campaign; raise `NothingToDraw` if the run is not complete."""
     from icha.datasets.campaign import run_place, select_run
-    from icha.datasets.variables.campaign import COMPLETE
+    from icha.datasets.variables.campaign import WHOLE_RUNS
 
     dataset = campaign[labels.study].to_dataset()
-    if dataset["status"].isel(run_place(dataset, labels)) != COMPLETE:
+    if int(dataset["status"].isel(run_place(dataset, labels))) not in WHOLE_RUNS:
         raise NothingToDraw(f"{labels}: this run is not complete")
     return select_run(campaign, labels)
 
@@ -292,17 +292,19 @@ def _select_runs_with(condition, campaign, study, models=(None, REFERENCE_MODEL)
     return found
 
 
-def _has_separated(run):
-    return "hysteresis_loss" in run
-
-
 def select_detached_lines(
-    campaign: xr.DataTree, studies: Sequence[str], *, along_slopes: bool = False, both_models: bool = False
+    campaign: xr.DataTree,
+    studies: Sequence[str],
+    *,
+    quantity: str = "pull_off_pressure",
+    along_slopes: bool = False,
+    both_models: bool = False,
 ) -> dict[tuple[tuple[str, str, float | None], bool, str], list[ContactRuns]]:
     """Return the runs of some studies that were unloaded to complete separation, arranged as lines of points.
 
     Parameters
     ----------
+    quantity : variable of the loop that the runs must have; a run that failed checks of its loss has no loss.
     along_slopes : True if a line joins points at several rms slopes. If False, every rms slope has its own line.
     both_models : True to add boundary elements to runs of another model.
 
@@ -316,17 +318,24 @@ def select_detached_lines(
     NothingToDraw
         If no run was unloaded to complete separation, or if no run of a study is complete.
     """
+
+    def has_quantity(run):
+        return quantity in run
+
     found = {}
     for study in studies:
-        points = group_by_contact(campaign, _select_runs_with(_has_separated, campaign, study))
+        points = group_by_contact(campaign, _select_runs_with(has_quantity, campaign, study))
         if both_models and points and points[0].labels.model != REFERENCE_MODEL:
-            points += group_by_contact(campaign, _select_runs_with(_has_separated, campaign, study, [REFERENCE_MODEL]))
+            points += group_by_contact(campaign, _select_runs_with(has_quantity, campaign, study, [REFERENCE_MODEL]))
         for point in points:
             material, surface, slope = point.contact
             line = (material, surface, None if along_slopes else slope), point.applicable, point.labels.model
             found.setdefault(line, []).append(point)
     if studies and not found:
-        raise NothingToDraw(f"studies {', '.join(studies)}: no run was unloaded to complete separation")
+        words = quantity.replace("_", " ")
+        raise NothingToDraw(
+            f"studies {', '.join(studies)}: no run was unloaded to complete separation with a valid {words}"
+        )
     return found
 
 

@@ -10,10 +10,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import xarray as xr
 import yaml
 
-from icha.analysis.allocation import LEVELS, allocate, half_width_of_seeds, variances_per_seed
+from icha.analysis.allocation import LEVELS, allocate, half_width_of_seeds, nest, variances_per_seed
 from icha.analysis.answers import WORDS
 from icha.analysis.estimates import estimate_campaign
 from icha.configuration.campaign import Campaign
@@ -45,6 +46,7 @@ class Choice(NamedTuple):
         do not help.
     seconds : expected time of all runs of the study with these seeds on one core.
     reason : reason why the accuracy cannot be reached; empty if it can.
+    left_out : runs that the answers leave out, in words; empty if there are none.
     """
 
     quantity: str
@@ -53,12 +55,14 @@ class Choice(NamedTuple):
     counts: dict[str, int]
     seconds: float
     reason: str = ""
+    left_out: str = ""
 
     @property
     def sentence(self) -> str:
-        """The accuracy that was reached, beside the required one."""
+        """The accuracy that was reached, beside the required one, and the runs that are left out."""
         reached = f"± {100 * self.half_width:.2g} %" if math.isfinite(self.half_width) else "no interval"
-        return f"{WORDS[self.quantity]} {reached} ({100 * self.required:.3g} % required)"
+        left_out = f"; {self.left_out}" if self.left_out else ""
+        return f"{WORDS[self.quantity]} {reached} ({100 * self.required:.3g} % required){left_out}"
 
 
 def choose_levels(campaign: Campaign, results: Path, cores: int) -> dict[str, Choice]:
@@ -110,19 +114,39 @@ def choose_for_study(name: str, study: Study, estimates, costs: Mapping[str, flo
     accuracy = study.accuracy
     quantity, required = quantity_of(accuracy, study), accuracy.half_width
     answers = [_answers(estimate, name, quantity) for estimate in estimates]
-    if answers[0] is None:
+    present = {level: len(getattr(study.seeds_of_levels, level) or ()) for level in LEVELS}
+    if answers[0] is None or not answers[0]["fine_seeds"].all():
         reason = f"no run has a result for {quantity}; look at the runs that ended early"
         return Choice(quantity, math.inf, required, {}, 0.0, reason)
+    left_out = _left_out(answers[0])
+    if not _has_estimates(answers[0]):
+        # Too few seeds have results. As many seeds are added as failed, and the accuracy is known afterwards.
+        used = {level: int(answers[0][name].min()) for level, name in LEVELS.items()}
+        counts = nest({level: 2 * count - used[level] for level, count in present.items() if count})
+        return Choice(quantity, math.inf, required, counts, _seconds(costs, counts), "", left_out)
     half_width = half_width_of_seeds(answers[0])
-    present = {level: len(getattr(study.seeds_of_levels, level) or ()) for level in LEVELS}
+    if not np.isfinite(answers[0]["estimate_high"]).all():
+        reason = "no interval is stated for the runs that are left"
+        return Choice(quantity, math.inf, required, {}, _seconds(costs, present), reason, left_out)
     if half_width <= required:
-        return Choice(quantity, half_width, required, {}, _seconds(costs, present))
+        return Choice(quantity, half_width, required, {}, _seconds(costs, present), "", left_out)
     budget = accuracy.budget and accuracy.budget * cores
-    choices = [_least_cost(each, costs, required, budget, present) for each in answers if each is not None]
+    choices = [_least_cost(each, costs, required, budget, present) for each in answers if _has_estimates(each)]
     _, _, counts, reason = min(choices, key=lambda choice: choice[:2])
     if all(count == present[level] for level, count in counts.items()):
         counts = {}
-    return Choice(quantity, half_width, required, counts, _seconds(costs, counts or present), reason)
+    return Choice(quantity, half_width, required, counts, _seconds(costs, counts or present), reason, left_out)
+
+
+def _has_estimates(answers: xr.Dataset | None) -> bool:
+    return answers is not None and bool(np.isfinite(answers["estimate"]).all())
+
+
+def _left_out(answers: xr.Dataset) -> str:
+    """Return which runs the answers leave out, in words; empty if all runs are used."""
+    if "left_out" not in answers:
+        return ""
+    return "; ".join(dict.fromkeys(filter(None, answers["left_out"].values.tolist())))
 
 
 def _answers(estimate: xr.DataTree, name: str, quantity: str) -> xr.Dataset | None:

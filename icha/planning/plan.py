@@ -12,9 +12,10 @@ from icha.configuration.cases import campaign_sha256, run_settings, run_sha256
 from icha.configuration.plausibility import energy_ratio
 from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets import results as results_files
-from icha.datasets.attributes import why_no_result
+from icha.datasets.attributes import why_failed
 from icha.datasets.labels import RunLabels
 from icha.datasets.results import ResultFiles, job_file
+from icha.datasets.variables.campaign import STATUS_ATTRIBUTES
 from icha.figures.registry import declaration_of
 from icha.path.targets import QUANTITIES
 from icha.planning import costs
@@ -241,7 +242,7 @@ def run_state(file: Path, sha256: str) -> tuple[str, str]:
         return TO_DO, ""
     try:
         with h5py.File(file, "r") as data:
-            names = ("config_sha256", "incomplete", "failed_checks", "beyond_model")
+            names = ("config_sha256", *STATUS_ATTRIBUTES.values())
             attributes = {name: text(data.attrs[name]) for name in names if name in data.attrs}
     except OSError as error:
         if error.errno is not None:  # the file cannot be read, for example without permission
@@ -249,7 +250,7 @@ def run_state(file: Path, sha256: str) -> tuple[str, str]:
         return DAMAGED, ""  # not a valid netCDF-4 file
     if attributes.get("config_sha256") != sha256:
         return CHANGED, ""
-    reason = why_no_result(attributes)
+    reason = why_failed(attributes)
     return (FAILED, reason) if reason else (DONE, attributes.get("beyond_model", ""))
 
 

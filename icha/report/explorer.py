@@ -20,7 +20,7 @@ import xarray as xr
 
 from icha.contact.models import MODELS, model_of
 from icha.datasets import results
-from icha.datasets.attributes import why_no_result
+from icha.datasets.attributes import why_failed
 from icha.datasets.campaign import find_snapshot, reduced_gap, run_labels, select_run, spots_of
 from icha.datasets.files import read_campaign, read_dataset, readable
 from icha.datasets.labels import RunLabels, path_fields
@@ -225,7 +225,7 @@ def encode_run(run: xr.Dataset, maps: Sequence[str] | None) -> dict:
     of_indenter = {"force": 1e6, "indentation": 1e6} if "shape" in run else {}
     return {
         **{name: encode_floats(run[name] * factor) for name, factor in of_indenter.items()},
-        "failure": why_no_result(run.attrs),
+        "failure": why_failed(run.attrs),
         "period": float(run["period"]),
         "periodic": str(run["boundary"].values) == "periodic",
         "grid": int(run["grid"]),

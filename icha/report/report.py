@@ -17,12 +17,11 @@ import xarray as xr
 
 from icha.analysis.answers import answers_of, paragraph
 from icha.analysis.checks import worst
-from icha.analysis.sample_words import distribution_words, sample_rows
+from icha.analysis.sample_words import distribution_words, left_out_lines, sample_rows
 from icha.analysis.validity import statements_on_dataset
 from icha.checks.findings import Check
 from icha.contact.models import MODEL_PAPER
 from icha.datasets.results import EXPLORER
-from icha.figures.captions import count_runs
 from icha.figures.registry import figure_number
 from icha.report.sections import list_sources, picture_of_spectra, summarise_errors, summarise_surface
 from icha.report.studies import summarise_study
@@ -154,26 +153,22 @@ def _sample(node):
         "cases": data.sizes["case"],
         "parameters": [name.replace("_", " ") for name in names],
         "distributions": [distribution_words(data, name) for name in names],
-        "rows": sample_rows(data),
+        "rows": (rows := sample_rows(data)),
+        "left_out": left_out_lines(rows),
     }
-
-
-def _caption(figure, campaign):
-    """Return the caption of a figure, with the numbers of runs that are missing or drawn pale."""
-    return f"{Path(figure.text).read_text(encoding='utf-8')} {count_runs(campaign, figure.studies)}".strip()
 
 
 def _pictures(figures: Sequence[ReportFigure], campaign: xr.DataTree, link) -> list[dict]:
     """Return the figures of the page: first the figures of several studies or of no study, then those of each study.
 
-    The number of a figure is part of its name. Captions state how many runs are missing or drawn pale.
+    The number of a figure is part of its name.
     """
     studies = list(campaign.children)
     pictures = [
         {
             "name": figure.name,
             "number": figure_number(figure.name) or figure.name,
-            "caption": _caption(figure, campaign),
+            "caption": Path(figure.text).read_text(encoding="utf-8").strip(),
             "data": base64.b64encode(Path(figure.png).read_bytes()).decode("ascii"),
             "pdf": link(figure.pdf),
             "study": figure.studies[0] if len(figure.studies) == 1 and figure.studies[0] in studies else None,

@@ -10,6 +10,7 @@ import os
 import numpy as np
 import xarray as xr
 
+from icha.analysis.measured_error import left_out_runs
 from icha.analysis.model_error import SUMMARISED
 from icha.datasets.labels import place_of, slopes_of, surfaces_and_slopes
 from icha.datasets.surface_file import measured_scale
@@ -116,6 +117,7 @@ def summarise_errors(errors: xr.Dataset) -> dict:
         "axes": {label: errors[label].values.tolist() for label in ("material", "seed")}
         | {"rms_slope": slopes_of(errors)},
         "states": int(errors["area_error"].count()),
+        "left_out": left_out_runs(errors).sentence,
         "grids": sorted({int(n) for n in _finite(errors["solution_grid"])}),
         "adhesive": bool((errors["surface_energy"] > 0).any()),
         "tabor": list(dict.fromkeys(f"{mu:.2g}" for mu in (np.nanmin(tabor), np.nanmax(tabor)))),

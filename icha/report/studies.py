@@ -6,19 +6,12 @@ import numpy as np
 import xarray as xr
 from markupsafe import Markup
 
+from icha.analysis.left_out import AVERAGED_APART, ENDED_EARLY, causes_of_runs, find_left_out, left_out_of_study
 from icha.checks.findings import IDENTITY_LIMIT
 from icha.datasets.campaign import loading_stops, reduced_gap, run_place, runs_of_status, select_run
 from icha.datasets.labels import LABELS, RunLabels, slopes_of
-from icha.datasets.variables.campaign import (
-    BEYOND_MODEL,
-    COMPUTED_RUNS,
-    FAILED_CHECKS,
-    INCOMPLETE,
-    LOADED_RUNS,
-    MISSING,
-    RAGGED,
-)
-from icha.figures.select import asked_seeds, path_steps
+from icha.datasets.variables.campaign import BEYOND_MODEL, COMPUTED_RUNS, FAILED_RUNS, LOADED_RUNS, MISSING, RAGGED
+from icha.figures.select import path_steps
 from icha.report.template import MOST_ROWS, format_mean, format_range, format_scientific
 from icha.support.formatting import choose_unit, format_quantity
 
@@ -52,10 +45,9 @@ def summarise_study(campaign: xr.DataTree, name: str) -> dict:
     dataset = campaign[name].to_dataset()
     status = dataset["status"].values
     axes = {label: dataset[label].values.tolist() for label in LABELS} | {"rms_slope": slopes_of(dataset)}
-    complete, incomplete, failed_checks, missing = (
-        runs_of_status(dataset, name, kinds) for kinds in (LOADED_RUNS, (INCOMPLETE,), (FAILED_CHECKS,), (MISSING,))
+    complete, failed, missing = (
+        runs_of_status(dataset, name, kinds) for kinds in (LOADED_RUNS, FAILED_RUNS, (MISSING,))
     )
-    failed = [*incomplete, *failed_checks]
     reasons = [(labels, _reason(dataset, "applicability", labels)) for labels in complete]
     # Spots and events take much memory, and the page does not need these variables.
     small = xr.DataTree.from_dict({f"/{name}": dataset.drop_dims([dim for dim in RAGGED if dim in dataset.dims])})
@@ -68,6 +60,7 @@ def summarise_study(campaign: xr.DataTree, name: str) -> dict:
         "failed": len(failed),
         "missing": len(missing),
         "combinations": status.size,
+        "left_out": left_out_of_study(dataset, of_loss=True).words,
         "failures": [(labels, _reason(dataset, "failure", labels)) for labels in failed[:MOST_ROWS]],
         "not_applicable": [(labels, reason) for labels, reason in reasons if reason],
         "lacking": missing[:MOST_ROWS],
@@ -154,20 +147,38 @@ def _table(runs) -> dict:
 def _ensembles(dataset: xr.Dataset, runs: list[RunLabels]) -> list[tuple[dict, list[RunLabels]]]:
     """Group runs that differ only in their seed; runs to which the model is not applicable form separate groups.
 
-    For each group, return the first cells of the table row (labels and numbers of seeds) and the runs of the group.
+    For each group, return the first cells of the table row (labels, and seeds that are left out) and the runs of the
+    group.
     """
     groups: dict[tuple[RunLabels, bool], list[RunLabels]] = {}
     for run in runs:
         groups.setdefault((run._replace(seed=0), not _reason(dataset, "applicability", run)), []).append(run)
     return [
-        ({"labels": labels, "applicable": fit, "count": len(group), "asked": asked_seeds(dataset, labels)}, group)
+        ({"labels": labels, "applicable": fit, "left_out": _left_out(dataset, group)}, group)
         for (labels, fit), group in groups.items()
     ]
 
 
+def _left_out(dataset: xr.Dataset, used: list[RunLabels], *, of_loss: bool = False):
+    """Describe the seeds that a mean over the runs `used` leaves out."""
+    place = run_place(dataset, used[0])
+    del place["seed"]
+    at = dataset[["status", *(["applicability"] if "applicability" in dataset else [])]].isel(place)
+    causes = []
+    for seed, cause in zip(dataset["seed"].values, causes_of_runs(at, of_loss=of_loss).values, strict=True):
+        if seed in {labels.seed for labels in used}:
+            cause = ""
+        elif not cause:
+            other = used[0]._replace(seed=int(seed))
+            applicable = [not _reason(dataset, "applicability", each) for each in (used[0], other)]
+            cause = ENDED_EARLY if applicable[0] == applicable[1] else AVERAGED_APART
+        causes.append(cause)
+    return find_left_out("seeds", causes)
+
+
 def _means(dataset: xr.Dataset, complete: list[RunLabels]) -> dict:
     """Return the table of means over seeds at the targets, with the accuracy of each mean."""
-    groups = [(row, runs) for row, runs in _ensembles(dataset, complete) if row["asked"] > 1]
+    groups = [(row, runs) for row, runs in _ensembles(dataset, complete) if row["left_out"].wanted > 1]
     variables = ["reduced_pressure", "contact_area_fraction", "reduced_separation", "leg", "step_kind", "step_target"]
     steps = dataset[[*variables, "step_count", "mean_gap", "unit_height", "boundary"]]
     members = []
@@ -176,15 +187,19 @@ def _means(dataset: xr.Dataset, complete: list[RunLabels]) -> dict:
         members.append((row, [collect_states(run.isel(step=slice(0, int(run["step_count"])))) for run in runs]))
     table = _stops_of([stops for _, states in members for stops in states])
 
-    def cell(states, target):
+    def cell(states, target, has_interval):
         at_stop = [stops[table["kind"], target] for stops in states if (table["kind"], target) in stops]
         if len(at_stop) < len(states):
             return None
         return Markup("<br>").join(
-            format_mean(np.array([state[name] for state in at_stop]), FORMATS[name]) for name in table["shown"]
+            format_mean(np.array([state[name] for state in at_stop]), FORMATS[name], has_interval=has_interval)
+            for name in table["shown"]
         )
 
-    rows = [row | {"cells": [cell(states, target) for target in table["stops"]]} for row, states in members]
+    rows = [
+        row | {"cells": [cell(states, target, row["left_out"].has_interval) for target in table["stops"]]}
+        for row, states in members
+    ]
     return table | {"count": len(groups), "rows": rows}
 
 
@@ -193,53 +208,73 @@ def _means(dataset: xr.Dataset, complete: list[RunLabels]) -> dict:
 
 def _loops(campaign: xr.DataTree, dataset: xr.Dataset, complete: list[RunLabels]) -> dict:
     """Return the tables of pull-off and hysteresis loss of runs with unloading, averaged over seeds."""
-    if "hysteresis_loss" not in dataset:
+    if "pull_off_pressure" not in dataset:
         return {"rows": [], "parts": {}, "count": 0}
     runs = {labels: select_run(campaign, labels) for labels in complete}
     # If a run leaves the range of its model, the path ends before unloading.
-    groups = _ensembles(dataset, [labels for labels, run in runs.items() if "hysteresis_loss" in run])
-    rows = [row | _loop([runs[labels] for labels in members]) for row, members in groups[:MOST_ROWS]]
+    groups = _ensembles(dataset, [labels for labels, run in runs.items() if "pull_off_pressure" in run])
+    rows = []
+    for row, members in groups[:MOST_ROWS]:
+        with_loss = [labels for labels in members if "hysteresis_loss" in runs[labels]]
+        of_loss = {"loss_left_out": _left_out(dataset, with_loss, of_loss=True)} if with_loss else {}
+        row |= _pull_off([runs[labels] for labels in members], row["left_out"].has_interval)
+        rows.append(row | of_loss | _loss([runs[labels] for labels in with_loss], of_loss))
     shown = {name for row in rows for name, share in row["shares"].items() if share}
     parts = {name: text for name, text in LOSS_NAMES.items() if name in shown}
     return {"rows": rows, "parts": parts, "count": len(groups)}
 
 
-def _loop(runs: list[xr.Dataset]) -> dict:
-    """Return the table cells with pull-off and loss, averaged over runs that differ only in their seed."""
+def _pull_off(runs: list[xr.Dataset], has_interval: bool) -> dict:
+    """Return the table cells with pull-off, averaged over runs that differ only in their seed."""
+
+    def values(name):
+        return np.array([float(run[name]) for run in runs])
+
+    def mean(values, unit=""):
+        return _with_unit(values, unit, has_interval=has_interval)
+
+    cells = {
+        "largest_pressure": mean(values("largest_reduced_pressure")),
+        "largest_area": mean(values("largest_contact_area_fraction")),
+        "pull_off": mean(values("pull_off_pressure"), "Pa"),
+    }
+    if values("surface_energy")[0] > 0:
+        cells |= {
+            "at": mean(values("pull_off_separation") / values("unit_height")),
+            "over_strength": mean(values("pull_off_over_strength")),
+            # Boundary elements have no asperities, and one sphere is not a sum of asperities.
+            **({} if "force" in runs[0] else {"over_summits": mean(values("pull_off_over_summits"))}),
+            "detachment": mean(values("detachment_pressure"), "Pa"),
+        }
+    units = {"pull_off_force": "N", "pull_off_force_over_jkr": "", "work_of_adhesion_approach": "J/m²"}
+    units |= {"work_of_adhesion_retraction": "J/m²"}
+    cells |= {name: mean(values(name), unit) for name, unit in units.items() if all(name in run for run in runs)}
+    return cells
+
+
+def _loss(runs: list[xr.Dataset], of_loss: dict) -> dict:
+    """Return the table cells with the loss, averaged over runs that differ only in their seed; none without runs."""
+    if not runs:
+        return {"shares": dict.fromkeys(LOSS_NAMES)}
 
     def values(name):
         return np.array([float(run[name]) for run in runs])
 
     # Losses below this bound are rounding errors.
     rounding = IDENTITY_LIMIT * np.array([np.nanmax(np.abs(run["work"].values)) for run in runs])
-    loss = values("hysteresis_loss")
+    loss, has_interval = values("hysteresis_loss"), of_loss["loss_left_out"].has_interval
     lost = np.abs(loss) > rounding
-    cells = {
-        "largest_pressure": _with_unit(values("largest_reduced_pressure")),
-        "largest_area": _with_unit(values("largest_contact_area_fraction")),
-        "pull_off": _with_unit(values("pull_off_pressure"), "Pa"),
-        "loss": _with_unit(np.where(lost, loss, 0.0), "J/m²"),
-    }
+    cells = {"loss": _with_unit(np.where(lost, loss, 0.0), "J/m²", has_interval=has_interval)}
     if values("surface_energy")[0] > 0:
-        cells |= {
-            "at": _with_unit(values("pull_off_separation") / values("unit_height")),
-            "over_strength": _with_unit(values("pull_off_over_strength")),
-            # Boundary elements have no asperities, and one sphere is not a sum of asperities.
-            **({} if "force" in runs[0] else {"over_summits": _with_unit(values("pull_off_over_summits"))}),
-            "detachment": _with_unit(values("detachment_pressure"), "Pa"),
-            "over_energy": _with_unit(values("hysteresis_loss_over_surface_energy")),
-        }
-    units = {"pull_off_force": "N", "pull_off_force_over_jkr": "", "work_of_adhesion_approach": "J/m²"}
-    units |= {"work_of_adhesion_retraction": "J/m²"}
-    cells |= {name: _with_unit(values(name), unit) for name, unit in units.items() if all(name in run for run in runs)}
-    return cells | {
-        "shares": {name: values(name).sum() / loss.sum() if lost.any() else None for name in LOSS_NAMES},
-    }
+        relative = values("hysteresis_loss_over_surface_energy")
+        cells["over_energy"] = _with_unit(relative, has_interval=has_interval)
+    shares = {name: values(name).sum() / loss.sum() if lost.any() else None for name in LOSS_NAMES}
+    return cells | {"shares": shares}
 
 
-def _with_unit(values: np.ndarray, unit: str = "") -> Markup:
+def _with_unit(values: np.ndarray, unit: str = "", *, has_interval: bool) -> Markup:
     """Format a mean with its unit; a second line contains the accuracy of the mean."""
     factor, unit = choose_unit(float(np.mean(values)), unit) if unit else (1.0, "")
     mean = format_scientific(float(np.mean(values)) * factor) + (f" {unit}" if unit else "")
-    text = format_range(values * factor, format_scientific)
+    text = format_range(values * factor, format_scientific, has_interval=has_interval)
     return (mean + (Markup("<br>") + text if text else "")).replace("-", "−")

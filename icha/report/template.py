@@ -50,14 +50,16 @@ def per_cent(value: float, *, signed: bool = True) -> str:
     return text.replace("+0.0", "0.0").replace("-0.0", "0.0").replace("-", "−")
 
 
-def format_mean(values: np.ndarray, form) -> Markup:
+def format_mean(values: np.ndarray, form, *, has_interval: bool = True) -> Markup:
     """Format the mean of values and the accuracy of the mean (`format_range`); `form` formats one number."""
-    text = format_range(values, form)
+    text = format_range(values, form, has_interval=has_interval)
     return Markup(form(float(np.mean(values)))) + (Markup(" ") + text if text else "")
 
 
-def format_range(values: np.ndarray, form) -> Markup | str:
-    """Format the 95 % interval of a mean, or the extremes of fewer than five values. Equal values give an empty text.
+def format_range(values: np.ndarray, form, *, has_interval: bool = True) -> Markup | str:
+    """Format the 95 % interval of a mean, if it has one, or the extremes of fewer than five values.
+
+    Equal values give an empty text.
 
     If all values are positive and the interval would reach zero, the interval is computed from their logarithms.
     """
@@ -67,6 +69,8 @@ def format_range(values: np.ndarray, form) -> Markup | str:
         return ""
     if len(values) < ENOUGH:
         low, high = np.min(values), np.max(values)
+    elif not has_interval:
+        return ""
     elif np.all(values > 0) and over.confidence >= over.mean:
         low, high = over.band(positive=True)
     else:

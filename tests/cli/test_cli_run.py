@@ -104,7 +104,7 @@ def test_a_run_that_fails_leaves_a_dataset_and_is_listed_with_its_reason(project
     far["studies"]["load"] |= {"materials": ["bare"], "snapshots": [{"mean_separation": "1 m"}]}
     (project / "config/campaigns/far.yaml").write_text(yaml.safe_dump(far))
     output = run(project, "dataset", campaign="far", status=1)
-    assert "2 runs without a result; all reasons: results/far/logs/failed_runs.txt" in output
+    assert "2 runs failed; all reasons: results/far/logs/failed_runs.txt" in output
     assert "\n  load: 2 of 2 seeds of rough, slope 1, bare\n    nothing was computed: path: " in output
     assert "Verdict on the checks" in output and "dataset: results/far/dataset/far.nc" in output
     lines = [line for line in output.splitlines() if line.startswith("[")]

@@ -146,7 +146,9 @@ def test_combinations_that_nobody_asked_for_are_not_in_the_design(tmp_path):
     write_dataset(campaign_tree([(steep, asked[steep])], design=[steep, other]), tmp_path / "c.nc")
     tree = read_campaign(tmp_path / "c.nc")
     status = tree["slopes"]["status"]
-    assert status.attrs["flag_meanings"] == "complete incomplete missing not_in_design failed_checks beyond_the_model"
+    assert status.attrs["flag_meanings"] == (
+        "complete incomplete missing not_in_design failed_checks beyond_the_model failed_loss_checks"
+    )
     table = np.array(status.attrs["flag_meanings"].split())[status.values]
     assert status["rms_slope"].values.tolist() == [0.2, 1.0] and status["material"].values.tolist() == ["soft", "hertz"]
     assert table.tolist() == [[[[["not_in_design", "missing"], ["complete", "not_in_design"]]]]]

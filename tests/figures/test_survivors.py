@@ -105,9 +105,9 @@ def test_figures_of_one_run_say_that_the_model_is_not_applicable(surface):
 
 
 def test_captions_count_what_is_missing():
-    assert count_runs(campaign(), ["five"]) == ""
+    assert count_runs({"campaign": campaign()}, ["five"]) == ""
     tree = campaign(lacking=(2,), failed={3: 2}, checks=(4,), pale=(1, 5))
-    assert count_runs(tree, ["five"]) == (
-        "2 of 10 runs did not complete; see the section Failed runs. 1 of 10 runs failed their checks; see the section "
-        f"Failed runs. Note on 2 runs: {REASON}."
+    assert count_runs({"campaign": tree}, ["five"]) == (
+        "The figure shows 7 of 10 runs; 1 not computed, 1 did not finish, 1 failed a check. Means over too few of the "
+        f"requested seeds have no intervals. The report lists the reasons. Note on 2 runs: {REASON}."
     )

@@ -264,13 +264,14 @@ def test_means_over_remaining_seeds_have_their_number_and_no_confidence(write, p
     text = write(campaign=campaign_tree(some.items()), figures=figures)
     Page(text)
     separate, row = sorted(rows(means(text)), key=lambda cells: cells[3])
-    assert separate[0].endswith("(model not applicable)") and separate[3] == "1 of 5"
-    assert row[3] == "3 of 5" and not any("±" in cell for cell in row)
+    assert separate[0].endswith("(model not applicable)") and separate[3].startswith("1 of 5 seeds; 1 failed")
+    assert row[3] == "3 of 5 seeds; 1 failed a check, 1 averaged separately; biased, so no interval is stated"
+    assert not any("±" in cell for cell in row)
     mean, low, high = map(format_scientific, (areas[2:].mean(), areas[2:].min(), areas[2:].max()))
     assert row[-2].split("<br>")[0] == f"{mean} ({low} … {high})"
     assert "loss below zero" in section(text, "failures", "not-applicable")
     assert "seed 2" in section(text, "not-applicable", "studies")
-    assert "runs failed their checks; see the section Failed runs." in text
+    assert "4 of 5 runs; 1 failed a check" in section(text, "failures", "not-applicable")
 
 
 @pytest.mark.parametrize(

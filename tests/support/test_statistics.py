@@ -79,9 +79,13 @@ def test_the_comparison_has_bands_over_the_complete_seeds():
     areas = comparison["contact_area_fraction"].transpose(*LABELS, ...).values[0, 0, :3, 0, 0]
     expected = ensemble(areas)
     assert comparison["seed_count"].item() == 3
-    for name in ("mean", "deviation", "confidence"):
+    for name in ("mean", "deviation"):
         np.testing.assert_allclose(comparison[f"area_{name}"].values[0, 0, 0, 0], getattr(expected, name), rtol=1e-12)
         assert np.all(comparison[f"separation_{name}"].values > 0)
+    # A quarter of the seeds is missing, so no interval is stated.
+    assert np.isnan(comparison["area_confidence"]).all()
+    whole = compare_runs(campaign_tree(runs[:3])["one"].to_dataset())["area_confidence"]
+    np.testing.assert_allclose(whole.values[0, 0, 0, 0], expected.confidence, rtol=1e-12)
     one = compare_runs(campaign_tree(runs[:1])["one"].to_dataset())
     assert np.isnan(one["area_confidence"].values).all() and np.isfinite(one["area_mean"].values).all()
 

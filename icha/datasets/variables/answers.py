@@ -2,7 +2,11 @@
 
 from icha.datasets.variables.terms import read_tables
 
-_MISSING = {
+_NO_ESTIMATE = "where too few seeds have results"
+_WITHOUT = ("estimate", "share_seeds", "share_model", "share_refinement", "asperity_coefficient", "degrees_of_freedom")
+_MISSING = {name: {"missing": _NO_ESTIMATE} for name in _WITHOUT} | {
+    "estimate_low": {"missing": "where more than a tenth of the runs is left out"},
+    "estimate_high": {"missing": "where more than a tenth of the runs is left out"},
     "share_grid": {"missing": "where the study has no runs on half the grid"},
     "share_inputs": {"missing": "where the study has no sampled parameters"},
 }

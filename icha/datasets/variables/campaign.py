@@ -5,14 +5,21 @@ import numpy as np
 from icha.datasets.variables.terms import Variable, bin_table, read_tables
 
 # Complete runs are results. The file of a run with failed checks contains values, but these values must not be used.
-COMPLETE, INCOMPLETE, MISSING, NOT_IN_DESIGN, FAILED_CHECKS, BEYOND_MODEL = range(6)
+# Of a run that only failed checks of the hysteresis loss, the values of the loss must not be used.
+COMPLETE, INCOMPLETE, MISSING, NOT_IN_DESIGN, FAILED_CHECKS, BEYOND_MODEL, FAILED_LOSS = range(7)
 STATUS_MEANINGS = ("complete", "incomplete", "missing", "not_in_design", "failed_checks", "beyond_the_model")
+STATUS_MEANINGS += ("failed_loss_checks",)
 # Attribute of a run that gives the reason for the status.
 STATUS_ATTRIBUTES = {INCOMPLETE: "incomplete", BEYOND_MODEL: "beyond_model", FAILED_CHECKS: "failed_checks"}
+STATUS_ATTRIBUTES |= {FAILED_LOSS: "failed_loss_checks"}
 # Status of runs that have a file.
-COMPUTED_RUNS = (COMPLETE, INCOMPLETE, FAILED_CHECKS, BEYOND_MODEL)
+COMPUTED_RUNS = (COMPLETE, INCOMPLETE, FAILED_CHECKS, BEYOND_MODEL, FAILED_LOSS)
+# Status of runs whose whole path is a result, apart from the loss if it fails a check.
+WHOLE_RUNS = (COMPLETE, FAILED_LOSS)
 # Status of runs whose first loading is a result. If the path leaves the range of the model, the loading ends there.
-LOADED_RUNS = (COMPLETE, BEYOND_MODEL)
+LOADED_RUNS = (*WHOLE_RUNS, BEYOND_MODEL)
+# Status of runs that are reported as failed.
+FAILED_RUNS = (INCOMPLETE, FAILED_CHECKS, FAILED_LOSS)
 
 _ATTRIBUTES = {
     "status": {

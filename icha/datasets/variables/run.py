@@ -48,6 +48,8 @@ _ATTRIBUTES = {
 RUN, CYCLE, LOOP, INDENTER = read_tables("run.txt", TERMS, _ATTRIBUTES, meaning=MEANING).values()
 # Coordinates of the cells in maps.
 _PLACES = {axis: TERMS[axis]._replace(dims=(dim,), coordinate=True) for axis, dim in zip("yx", CELLS, strict=True)}
+# Variables of the hysteresis loss, which are not valid if a run fails a check of its energies.
+OF_LOSS = frozenset(name for name in LOOP | INDENTER if "loss" in name.split("_"))
 # Variables that only runs with a certain model have, by name of the model.
 FURTHER = {
     name: (_PLACES if model.by_cells else {})

@@ -3,7 +3,7 @@
 from icha.datasets.variables.terms import TERMS, read_tables
 
 _NO_RESULT = "where the run of a case has no result"
-_NO_FIT = "where no polynomial is fitted"
+_NO_FIT = "where no polynomial is fitted; for half-widths also where more than a tenth of the cases is left out"
 _OF_CASES = ("contact_area_fraction", "mean_gap", "contact_stiffness", "spot_count", "nominal_pressure")
 _OF_CASES += ("pull_off_pressure", "hysteresis_loss", "middle", "low", "high")
 _OF_FITS = ("unexplained", "first_order", "total_order", "first_order_half_width", "total_order_half_width")
