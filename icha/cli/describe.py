@@ -59,9 +59,8 @@ def _print_scans(campaign, plots: Path | None) -> None:
             models.setdefault(case.surface, []).append(MODELS[case.model])
     for name in dict.fromkeys(case.surface for case in run_cases(campaign)):
         if isinstance(section := campaign.surfaces[name], SpectrumSurface):
-            text = Path(section.path).read_text(encoding="utf-8")
-            for line in (each for each in text.splitlines() if each.startswith(("# scan", "# profiles"))):
-                echo(f"{name}: {line.removeprefix('# ')}")
+            for line in _spectrum_lines(section):
+                echo(f"{name}: {line}")
     if not models:
         return
     from icha.surfaces.measured.resolution import examine_scan
@@ -73,6 +72,20 @@ def _print_scans(campaign, plots: Path | None) -> None:
             echo(line)
         if plots is not None:
             _draw_scan(section, plots / f"scan_{name}.png")
+
+
+def _spectrum_lines(section):
+    """Yield the sources of a table of a spectrum, and the rms height and slope that follow from its convention."""
+    from icha.surfaces.tabulated_spectrum import CONVENTIONS, read_spectrum_table
+
+    table = read_spectrum_table(section.path, section.length_unit, section.convention)
+    yield from table.sources
+    cell, convention = table.in_cell(section.period), section.convention or "surface"
+    whole, part = (formatting.length(float(f"{each.rms_height:.3g}")) for each in (table, cell))
+    yield (
+        f"rms height {whole} of the table, from {CONVENTIONS[convention].meaning} (convention {convention}); "
+        f"rms height {part} and rms slope {cell.rms_slope:.3g} in the cell"
+    )
 
 
 def _draw_scan(section, file: Path) -> None:

@@ -30,7 +30,7 @@ from icha.contact.models import MODELS
 from icha.datasets.labels import is_derived_study
 from icha.path.targets import FORCE, INDENTATION, QUANTITIES, WITHOUT_ADHESION, Target
 from icha.support import formatting
-from icha.support.input_files import read_columns
+from icha.support.tables import read_columns
 from icha.support.values import Name, Problem, Section, Text, distinct
 from icha.surfaces.resolution import Resolution
 
@@ -279,7 +279,7 @@ class Campaign(Section):
         yield from self.figures.script_problems()
         for label, entry in self.measurements.items():
             try:
-                read_columns(entry.path, entry.columns)
+                read_columns(entry.path, entry.columns, ratios=[entry.area.column])
             except ValueError as error:
                 yield ("measurements", label, "path"), entry.path, str(error)
 

@@ -44,12 +44,10 @@ def loop_cases(campaign: Campaign) -> list[ContactLabels]:
 def surface_settings(campaign: Campaign, name: str) -> dict:
     """Return the settings of a surface in SI units, without seed and path."""
     surface = campaign.surfaces[name]
-    if not surface.from_file:
-        settings = surface.model_dump(exclude_none=True, exclude={"boundary", "shape"})
-    elif isinstance(surface, MeasuredSurface):
+    if isinstance(surface, MeasuredSurface):
         settings = {"kind": surface.kind} | surface.preparation
-    elif surface.random:
-        settings = surface.model_dump(exclude={"path", "boundary", "shape"})
+    elif not surface.from_file or surface.random:
+        settings = surface.model_dump(exclude_none=True, exclude={"path", "boundary", "shape"})
     else:
         settings = {"kind": surface.kind, "period": surface.period, "metres_per_unit": surface.height_unit}
     return settings | surface.boundary_and_shape

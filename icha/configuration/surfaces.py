@@ -441,8 +441,17 @@ class SpectrumSurface(_SurfaceFromFile):
     path: File
     """Path of a text file with two columns, the wave number q and the power spectral density C(q) of an isotropic
     surface, relative to the configuration file. `icha.merge_spectra` makes such a file from scans."""
-    length_unit: UnitOfLength = Field(default="m", validate_default=True)
-    """Unit of length of the table, such as `um`: q is in rad/um, and C in um⁴."""
+    length_unit: UnitOfLength | None = None
+    """Unit of length of the table, such as `um`: q is in rad/um, and C in um⁴. Default: the units in the titles of the
+    columns, or m."""
+    convention: (
+        Literal["surface", "surface_jacobs", "surface_frequency", "profile", "profile_jacobs", "profile_frequency"]
+        | None
+    ) = None
+    """Convention of the power spectral density: the integral of the table that is the mean square height. `surface`:
+    2π∫qC dq. `surface_jacobs` (as on contact.engineering): ∫qC dq/(2π). `surface_frequency` (first column f = q/2π):
+    2π∫fC df. Of profiles of an isotropic surface, for q > 0 or f > 0: `profile`: 2∫C dq. `profile_jacobs`: ∫C dq/π.
+    `profile_frequency`: ∫C df. Default: `surface`; required if the titles state a unit of q without rad, or m³."""
     period: Length
     """Side L of the periodic cell. Waves longer than the cell are left out."""
     grid: integer(GRID)

@@ -92,7 +92,8 @@ def read_surface(section: MeasuredSurface | FileSurface | SpectrumSurface, seed:
     if isinstance(section, SpectrumSurface):
         from icha.surfaces.tabulated_spectrum import read_spectrum_table
 
-        spectrum = read_spectrum_table(section.path, section.length_unit).in_cell(section.period)
+        table = read_spectrum_table(section.path, section.length_unit, section.convention)
+        spectrum = table.in_cell(section.period)
         surface = spectrum.realise(section.grid, seed, section.amplitudes)
         return _with_shape(replace(surface, boundary="free") if section.free else surface, section)
     from icha.surfaces.measured.scan import read_height_map

@@ -23,7 +23,7 @@ from icha.figures.curves import (
 from icha.figures.declaration import Campaign, Declaration, Inputs, TruthFigure
 from icha.figures.looks import ASPERITIES_NAME, MODEL_MARKERS, TRUTH_LINE, model_handle, surface_label
 from icha.figures.style import DASHES, in_style, new_panels
-from icha.support.input_files import read_columns
+from icha.support.tables import read_columns
 
 if TYPE_CHECKING:
     import xarray as xr

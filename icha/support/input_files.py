@@ -1,20 +1,17 @@
-"""Check input files from unknown sources: kind of file, memory for reading, dangerous HDF5 files. Read CSV tables.
+"""Check input files from unknown sources: kind of file, memory for reading, dangerous HDF5 files.
 
 A small file can declare a very large array, or contain a large array in compressed form. Readers compare the declared
 size with a limit (`require_room`). `bounded_memory` limits the memory of the libraries that read the file.
 """
 
-import csv
 import os
 import re
 import stat
 import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 from icha.support import formatting
-from icha.support.rules import POSITIVE
 
 # Environment variable with the memory limit in MB, and the default limit.
 VARIABLE = "ICHA_INPUT_MB"
@@ -156,41 +153,3 @@ def refuse_traps(path: str | os.PathLike) -> None:
 
         if found := file.id.links.visit(trap, info=True):
             raise RefusedFile(found)
-
-
-def read_columns(path: str | Path, columns: dict[str, float]) -> list:
-    """Read columns of positive numbers from a CSV file with a line of headings; return one array for each column.
-
-    Parameters
-    ----------
-    path : path of the file.
-    columns : heading of each column to read, with the factor by which the numbers of this column are multiplied.
-
-    Raises
-    ------
-    ValueError
-        If the file cannot be read, a column is missing, or a value is not a positive number.
-    """
-    import numpy as np  # imported here because most commands read no table
-
-    if problem := problem_with_path(path):
-        raise ValueError(f"{problem}; expected a CSV file")
-    try:
-        with bounded_memory(), Path(path).open(encoding="utf-8-sig", newline="") as file:
-            rows = list(csv.DictReader(file, skipinitialspace=True))
-    except (OSError, UnicodeDecodeError, csv.Error, TooLarge) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise ValueError(f"cannot be read ({reason}); expected a CSV file") from None
-    if not rows:
-        raise ValueError("contains no values; expected a CSV file with a line of headings and lines of numbers")
-    found = {heading: [] for heading in columns}
-    for heading, numbers in found.items():
-        if heading not in rows[0]:
-            raise ValueError(f"has no column {heading!r}; expected one of {', '.join(map(str, rows[0]))}")
-        for number, row in enumerate(rows, start=1):
-            place = f"column {heading!r}, row {number}: {row[heading]!r}"
-            try:
-                numbers.append(POSITIVE.validate("", float(row[heading])))
-            except (TypeError, ValueError):
-                raise ValueError(f"{place}; expected a number greater than 0") from None
-    return [np.array(found[heading]) * factor for heading, factor in columns.items()]

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
+import re
+import unicodedata
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import gamma
 
 from icha.support.atomic_files import whole_file
 from icha.support.rules import LENGTH
+from icha.support.tables import check_lengths, is_number, positive_numbers, read_rows
+from icha.support.values import conversion_factor
 from icha.surfaces.moments import radial_power_spectrum
 from icha.surfaces.spectrum import IsotropicSpectrum
 from icha.surfaces.surface import Surface
@@ -54,6 +59,13 @@ class SpectrumTable:
             raise ValueError("table: expected wave numbers in increasing order, each once")
         object.__setattr__(self, "wave_number", q)
         object.__setattr__(self, "power", power)
+
+    @property
+    def rms_height(self) -> float:
+        """Root mean square height of all waves of the table, m."""
+        q = np.geomspace(self.wave_number[0], self.wave_number[-1], 10_000)
+        power = np.exp(np.interp(np.log(q), np.log(self.wave_number), np.log(self.power)))
+        return math.sqrt(2 * math.pi * float(np.trapezoid(q**2 * power, np.log(q))))
 
     def in_cell(self, period: float) -> TabulatedSpectrum:
         """Return the spectrum of surfaces in a periodic cell with a side of `period`, m."""
@@ -113,34 +125,154 @@ class TabulatedSpectrum(IsotropicSpectrum):
         return math.sqrt(2 * float(np.sum(self._shape(k) * k**2)) * q**4)
 
 
-def read_spectrum_table(path: str | os.PathLike, length_unit: float = 1.0) -> SpectrumTable:
-    """Read a table of q and C(q) from a text file with two columns; lines that begin with # are remarks.
+class Convention(NamedTuple):
+    """Convention of a table of a power spectral density.
+
+    Attributes
+    ----------
+    dimension : 2 for the spectrum of a surface, 1 for the spectrum of its profiles.
+    wave_factor : factor from the first column to the wave number q in rad/m.
+    power_factor : factor from the second column to C, whose integral over all wave vectors (or, for profiles, all
+        positive and negative wave numbers) is the mean square height.
+    meaning : integral of the table that is the mean square height.
+    """
+
+    dimension: int
+    wave_factor: float
+    power_factor: float
+    meaning: str
+
+
+_TURN = 2 * math.pi
+# Jacobs, Junge & Pastewka, Surf. Topogr.: Metrol. Prop. 5 (2017) 013001, compare the conventions.
+CONVENTIONS = {
+    "surface": Convention(2, 1.0, 1.0, "2 pi int q C dq"),
+    "surface_jacobs": Convention(2, 1.0, _TURN**-2, "1/(2 pi) int q C dq"),
+    "surface_frequency": Convention(2, _TURN, _TURN**-2, "2 pi int f C df"),
+    "profile": Convention(1, 1.0, 1.0, "2 int C dq"),
+    "profile_jacobs": Convention(1, 1.0, 1 / _TURN, "1/pi int C dq"),
+    "profile_frequency": Convention(1, _TURN, 0.5 / _TURN, "int C df"),
+}
+
+
+def read_spectrum_table(
+    path: str | os.PathLike, length_unit: float | None = None, convention: str | None = None
+) -> SpectrumTable:
+    """Read a table of wave numbers and power spectral densities from a text file with two columns.
+
+    Lines of words above the numbers, and lines that begin with #, are a heading. Units in its titles, such as
+    `q (rad/um), C (um^4)`, are those of the columns.
 
     Parameters
     ----------
     path : file with blanks, tabs, commas or semicolons between the columns.
-    length_unit : unit of length of the table, m: q is in rad per unit, C in the fourth power of the unit.
+    length_unit : unit of length of the table, m: q is in rad per unit, C in the fourth power of the unit (third power
+        for profiles). Default: the units of the titles, or m.
+    convention : a name of `CONVENTIONS`; default: "surface".
 
     Raises
     ------
     ValueError
-        If a line has no two numbers, or if the numbers are not a spectrum.
+        If a line has no two positive numbers, if the numbers are not a spectrum, or if the titles contradict the
+        arguments. The attribute `key` names the argument, if any.
     """
-    rows = []
-    for number, line in enumerate(Path(path).read_text(encoding="utf-8").splitlines(), 1):
-        text = line.partition("#")[0].replace(",", " ").replace(";", " ").split()
-        if not text:
-            continue
-        try:
-            q, power = map(float, text)
-        except ValueError:
-            raise ValueError(
-                f"has {line.strip()[:40]!r} in line {number}; expected a wave number and a power"
-            ) from None
-        rows.append((q / length_unit, power * length_unit**4))
+    from icha.surfaces.measured.settings import UnfitTopography
+
+    rows, remarks = read_rows(path)
+    words = list(itertools.takewhile(lambda row: not any(map(is_number, row[1])), rows))
+    rows = rows[len(words) :]
     if len(rows) < 2:
         raise ValueError(f"has {len(rows)} rows; expected at least two rows of a wave number and a power")
-    return SpectrumTable(*np.transpose(rows))
+    check_lengths(rows, 2)
+    unit = length_unit or 1.0
+    chosen = CONVENTIONS[convention or "surface"]
+    per_length, power_unit = 1 / unit, unit ** (chosen.dimension + 2)
+    if units := _units_of(words, remarks):
+        if convention is None and units.angle != "rad":
+            raise UnfitTopography(
+                "convention",
+                f"is missing, and the titles state {units.text} without rad, so the first column may be q or f = "
+                f"q/(2 pi); expected one of {', '.join(CONVENTIONS)}",
+            )
+        excluded = "rad" if chosen.wave_factor > 1 else "cycles"
+        if units.angle == excluded or units.exponent not in (None, chosen.dimension + 2):
+            raise UnfitTopography(
+                "convention",
+                f"is {convention or 'missing'}, but the titles state {units.text}; expected another of "
+                f"{', '.join(CONVENTIONS)}",
+            )
+        stated = units.per_length, units.power or units.per_length ** -(chosen.dimension + 2)
+        if length_unit and not np.allclose(stated, [per_length, power_unit], rtol=1e-6, atol=0):
+            raise UnfitTopography(
+                "length_unit", f"does not agree with the titles, which state {units.text}. Remove the key"
+            )
+        per_length, power_unit = stated
+    q, power = (positive_numbers(rows, column, str(column + 1)) for column in (0, 1))
+    q, power = q * per_length * chosen.wave_factor, power * power_unit * chosen.power_factor
+    if not (np.diff(q) > 0).all():
+        raise ValueError("has wave numbers that do not increase from row to row; expected each once, sorted")
+    if chosen.dimension == 1:
+        # The conversion needs a smooth spectrum.
+        q, power = _in_rings(q, power)
+        power = isotropic_from_profile(q, power)
+    return SpectrumTable(q, power, tuple(line for line in remarks if line.startswith(("scan", "profiles"))))
+
+
+class _Units(NamedTuple):
+    """Units in the titles of a table.
+
+    Attributes
+    ----------
+    per_length : unit of the first column, 1/m.
+    angle : "rad", "cycles", or "" if the unit of the first column contains neither.
+    power, exponent : unit of the second column, m^exponent; None if the titles do not contain it.
+    text : units as in the file.
+    """
+
+    per_length: float
+    angle: str
+    power: float | None
+    exponent: int | None
+    text: str
+
+
+_BRACKETS = re.compile(r"\(((?:[^()]|\([^()]*\))*)\)|\[([^\[\]]*)\]")
+_ANGLE = re.compile(r"(rad(?:ians?)?\b)|((?:cycles?|lines?)\b)")
+_LENGTH_POWER = re.compile(r"([^\W\d_]+)\s*(?:\^|\*\*)?\s*([-+]?\d+)?")
+
+
+def _units_of(words, remarks) -> _Units | None:
+    """Return the units in the titles above the numbers; None if there are none. Raises ValueError for unknown units."""
+    for row in [row for _, row in reversed(words)] or [remark.split() for remark in remarks[-1:]]:
+        line = " ".join(row)
+        texts = [first or second for first, second in _BRACKETS.findall(line)] or row
+        if not 1 <= len(texts) <= 2:
+            continue
+        first, *others = (_power_of_length(text) for text in texts)
+        if first is not None and first[1] == -1 and None not in others:
+            angle = next(("rad" if rad else "cycles" for rad, _ in _ANGLE.findall(texts[0])), "")
+            power, exponent = others[0] if others and others[0] else (None, None)
+            return _Units(first[0], angle, power, exponent, " and ".join(texts))
+        if re.search(r"/|\d", "".join(texts)):
+            raise ValueError(
+                f"has the titles {line[:60]!r}; expected units of length in brackets, such as q (rad/um), C (um^4)"
+            )
+    return None
+
+
+def _power_of_length(text) -> tuple[float, int] | None:
+    """Return the factor and exponent of a power of a unit of length, such as rad/um or nm^2 um^2; None for others."""
+    plain = _ANGLE.sub("", unicodedata.normalize("NFKC", text)).translate({0x2212: "-", 0xB7: " ", 0x22C5: " "})
+    factor, total = 1.0, 0
+    for k, side in enumerate(plain.split("/")):
+        for name, exponent in _LENGTH_POWER.findall(side):
+            power = int(exponent or 1) * (-1 if k else 1)
+            try:
+                factor *= float(conversion_factor(name, "m")) ** power
+            except ValueError:
+                return None
+            total += power
+    return (factor, total) if total else None
 
 
 def merge_spectra(
@@ -169,7 +301,7 @@ def merge_spectra(
     """
     members = [(*_of_scan(surface), _trusted_range(surface, tip_radius)) for surface in scans]
     scan_count = len(members)
-    members += _of_profiles([(np.asarray(x, float), np.asarray(z, float)) for x, z in profiles])
+    members += _of_profiles([_profile(each) for each in profiles])
     if not members:
         raise ValueError("scans: expected at least one scan or profile")
     trusted = []
@@ -193,6 +325,15 @@ def merge_spectra(
         for k, (_, _, (low, high, reason)) in enumerate(members)
     )
     return SpectrumTable(grid[covered], np.nanmean(np.exp(logarithms[:, covered]), axis=0), sources)
+
+
+def _profile(pair):
+    """Return positions and heights of a profile as arrays, nan where masked."""
+    try:
+        x, z = (np.ma.filled(np.ma.asarray(each).astype(float), np.nan) for each in pair)
+    except (TypeError, ValueError):
+        raise ValueError("profiles: expected a list of pairs (x, z) of positions and heights, m") from None
+    return np.atleast_1d(x), np.atleast_1d(z)
 
 
 def _of_scan(surface):
@@ -224,10 +365,17 @@ def _of_profiles(profiles):
     """Return wave numbers, isotropic spectrum and trusted range of each group of profiles with equal positions."""
     groups: dict[tuple[float, int], list[np.ndarray]] = {}
     for x, z in profiles:
+        if not (np.isfinite(x).all() and np.isfinite(z).all()):
+            raise ValueError(
+                "profiles: a profile has missing heights; expected finite positions and heights. Interpolate short "
+                "gaps, such as by numpy.interp, or use the longest part without a gap"
+            )
         steps = np.diff(x)
         equal = x.ndim == 1 and x.shape == z.shape and len(x) >= 16 and steps[0] > 0
-        if not equal or not np.allclose(steps, steps[0], rtol=1e-3):
+        if not equal or not np.allclose(steps, steps[0], rtol=1e-3, atol=0):
             raise ValueError("profiles: expected positions with equal, positive steps and as many heights, at least 16")
+        if np.ptp(z - np.polyval(np.polyfit(x, z, 1), x)) <= 1e-12 * np.max(np.abs(z)):
+            raise ValueError("profiles: a profile has heights that are all the same, apart from its tilt")
         groups.setdefault((float(f"{steps[0]:.6g}"), len(x)), []).append(_spectrum_of_profile(x, z))
     found = []
     for (step, count), spectra in groups.items():
@@ -247,11 +395,18 @@ def _spectrum_of_profile(x, z):
 
 
 def _in_rings(q, power):
-    """Return means of wave numbers and powers in intervals with equal steps of the logarithm."""
+    """Return means of wave numbers and powers in intervals with equal steps of the logarithm.
+
+    The mean is that of power/q^s, where q^s is the best power law, so a power law remains unchanged.
+    """
     edges = np.geomspace(0.999 * q[0], 1.001 * q[-1], max(3, math.ceil(_PER_DECADE * math.log10(q[-1] / q[0])) + 1))
     ring = np.searchsorted(edges, q) - 1
     count = np.bincount(ring)
-    return tuple(np.bincount(ring, weights=each)[count > 0] / count[count > 0] for each in (q, power))
+    exponent = np.polyfit(np.log(q), np.log(power), 1)[0]
+    log_q, level = (
+        np.bincount(ring, weights=each)[count > 0] / count[count > 0] for each in (np.log(q), power / q**exponent)
+    )
+    return np.exp(log_q), level * np.exp(exponent * log_q)
 
 
 _ISOTROPIC = "one-dimensional spectrum, converted for an isotropic surface with a local power law"

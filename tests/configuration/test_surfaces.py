@@ -65,11 +65,14 @@ def test_surfaces_with_a_tabulated_spectrum_have_seeds_and_the_slope_of_their_ta
     assert slope == pytest.approx(0.3, rel=5e-3)
     assert surface_settings(campaign, "rough") == {
         "kind": "spectrum",
-        "length_unit": 1.0,
         "period": 100e-6,
         "grid": 80,
         "amplitudes": "fixed",
     }
+    for missing in ("nowhere.txt", "."):
+        refused("", changes | {"surfaces.rough": section | {"path": missing}}, "expected a text file with a table")
+    (tmp_path / "titles.csv").write_text("q (1/um),C (um^4)\n1,2\n3,1\n", encoding="utf-8")
+    refused("", changes | {"surfaces.rough": section | {"path": "titles.csv"}}, "surfaces.rough.convention: ")
     (tmp_path / "wrong.txt").write_text("1 2\nthree 4\n", encoding="utf-8")
     refused("", changes | {"surfaces.rough": section | {"path": "wrong.txt"}}, "surfaces.rough.path: '")
     refused("", changes | {"surfaces.rough": section | {"grid": 16}}, "cells per shortest wave; expected at least")

@@ -7,6 +7,7 @@ from scipy.integrate import quad
 import icha
 from icha.surfaces.moments import radial_power_spectrum, spectral_moments
 from icha.surfaces.tabulated_spectrum import (
+    CONVENTIONS,
     SpectrumTable,
     isotropic_from_profile,
     merge_spectra,
@@ -42,11 +43,19 @@ def test_a_table_is_written_and_read_in_any_unit_of_length(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("1 2\nx y\n", "'x y' in line 2; expected a wave number and a power"),
-        ("1 2 3\n", "in line 1; expected a wave number and a power"),
+        ("1 2\nx y\n", "column 1, line 2: 'x'; expected a number greater than 0"),
+        ("1 2 3\n2 3 4\n", "has 3 fields in line 1; expected 2"),
+        ("1 2\n\n2 3 4\n", "has 3 fields in line 3; expected 2"),
         ("1 2\n", "has 1 rows; expected at least two"),
-        ("1 2\n1 3\n", "increasing order"),
-        ("1 2\n2 -3\n", "positive, finite"),
+        ("", "has 0 rows; expected at least two"),
+        ("1 2\n1 3\n", "do not increase"),
+        ("1 2\n2 -3\n", "column 2, line 2: '-3'"),
+        ("0 2\n2 3\n", "column 1, line 1: '0'"),
+        ("1 2\n2 nan\n", "column 2, line 2: 'nan'"),
+        ("1_0 2\n2_0 3\n", "column 1, line 1: '1_0'"),
+        ("1,5,2\n2,5,1\n", "decimal commas need semicolons"),
+        ("1,234;2\n2,345;1\n", "may be decimal or separate thousands"),
+        ("q (1/px), C (px^4)\n1, 2\n2, 1\n", "expected units of length in brackets"),
     ],
 )
 def test_wrong_tables_are_refused(text, message, tmp_path):
@@ -55,6 +64,84 @@ def test_wrong_tables_are_refused(text, message, tmp_path):
         read_spectrum_table(tmp_path / "table.txt")
     with pytest.raises(ValueError, match="no wave of the table fits"):
         TABLE.in_cell(4e-6)
+
+
+ROWS = [f"{q:.9e};{power:.9e}" for q, power in zip(Q * 1e-6, TABLE.power * 1e24, strict=True)]
+
+
+@pytest.mark.parametrize(
+    ("heading", "encoding"),
+    [
+        ("q (rad/um);C (um^4)", "utf-8-sig"),
+        ("Wellenzahl q in µm\nq (rad/µm);C (µm⁴)", "utf-16"),
+        ("# Höhen in µm\nq [rad/µm];C [µm^4]", "cp1252"),
+        ("q;C\nrad/um;um^2 um^2", "utf-8"),
+        ("# q (rad/um)  C (um^4)", "utf-8"),
+        ("wave number [µm⁻¹ rad];power", "utf-8"),
+    ],
+)
+@pytest.mark.parametrize("decimal", ".,")
+def test_headings_encodings_and_decimal_commas(tmp_path, heading, encoding, decimal):
+    """The units in the titles are those of the columns."""
+    path = tmp_path / "table.csv"
+    path.write_text("\n".join([heading, *ROWS]).replace(".", decimal) + "\n", encoding=encoding)
+    found = read_spectrum_table(path)
+    np.testing.assert_allclose(found.wave_number, Q, rtol=1e-8)
+    np.testing.assert_allclose(found.power, TABLE.power, rtol=1e-7)
+    with pytest.raises(ValueError, match="titles, which state") as raised:
+        read_spectrum_table(path, 1e-9)
+    assert raised.value.key == "length_unit"
+
+
+@pytest.mark.parametrize(
+    ("titles", "convention"),
+    [
+        ("q (1/m);C (m^4)", None),
+        ("q (rad/m);C (m^3)", None),
+        ("q (rad/m);C (m^4)", "profile"),
+        ("q (rad/m);C (m^4)", "surface_frequency"),
+        ("f (cycles/m);C (m^4)", "surface"),
+    ],
+)
+def test_titles_against_the_convention_are_refused(tmp_path, titles, convention):
+    (tmp_path / "table.csv").write_text(f"{titles}\n1;2\n2;1\n")
+    with pytest.raises(ValueError, match="the titles state") as raised:
+        read_spectrum_table(tmp_path / "table.csv", convention=convention)
+    assert raised.value.key == "convention"
+
+
+def convert(convention):
+    """Return the columns of a power law C = q^-3.6 in each convention, from its definition.
+
+    Jacobs, Junge & Pastewka (2017): C2D = |FT|^2/A has h^2 = 1/(2 pi) int q C dq, C1D has h^2 = 1/pi int C dq. The
+    frequency is f = q/(2 pi); the spectrum of profiles by frequency is one-sided, h^2 = int C df.
+    """
+    q = np.geomspace(1e4, 1e7, 31)
+    surface = q**-3.6
+    profile = np.array([2 * x**-2.6 * quad(lambda y: (1 + y**2) ** -1.8, 0, np.inf)[0] for x in q])
+    return q, {
+        "surface": (q, surface),
+        "surface_jacobs": (q, (2 * np.pi) ** 2 * surface),
+        "surface_frequency": (q / (2 * np.pi), (2 * np.pi) ** 2 * surface),
+        "profile": (q, profile),
+        "profile_jacobs": (q, 2 * np.pi * profile),
+        "profile_frequency": (q / (2 * np.pi), 2 * 2 * np.pi * profile),
+    }[convention]
+
+
+@pytest.mark.parametrize("convention", CONVENTIONS)
+def test_conventions_of_spectra(tmp_path, convention):
+    q, columns = convert(convention)
+    np.savetxt(tmp_path / "table.txt", np.column_stack(columns))
+    found = read_spectrum_table(tmp_path / "table.txt", convention=convention)
+    inside = (found.wave_number > 1.5 * q[0]) & (found.wave_number < q[-1] / 1.5)
+    rtol = 1e-9 if convention.startswith("surface") else 1e-3
+    np.testing.assert_allclose(found.power[inside], found.wave_number[inside] ** -3.6, rtol=rtol)
+
+
+def test_the_mean_square_height_is_the_integral_of_the_spectrum():
+    exact = 2 * np.pi * quad(lambda q: q * TRUE.psd(q), Q[0], Q[-1], points=[2 * np.pi / 25e-6])[0]
+    assert TABLE.rms_height == pytest.approx(np.sqrt(exact), rel=1e-3)
 
 
 def part(whole, corner, nodes, step=1, noise=0.0):
@@ -107,5 +194,35 @@ def test_profiles_of_an_isotropic_surface_give_its_spectrum():
 def test_nothing_to_merge_is_refused():
     with pytest.raises(ValueError, match="expected at least one scan or profile"):
         merge_spectra()
-    with pytest.raises(ValueError, match="equal, positive steps"):
-        merge_spectra(profiles=[(np.arange(20.0) ** 2, np.zeros(20))])
+
+
+X = 2e-9 * np.arange(256)
+Z = 1e-9 * np.random.default_rng(1).normal(size=256).cumsum()
+GAP = np.where(np.arange(256) == 7, np.nan, Z)
+UNEQUAL = X + 0.9e-9 * (np.arange(256) % 2)
+
+
+@pytest.mark.parametrize(
+    ("profiles", "message"),
+    [
+        ([(X, GAP)], "a profile has missing heights"),
+        ([(X, Z), (X, np.where(GAP == GAP, Z, np.inf))], "a profile has missing heights"),
+        ([(X, np.ma.masked_invalid(GAP))], "a profile has missing heights"),
+        ([(GAP, Z)], "a profile has missing heights"),
+        ([(UNEQUAL, Z)], "equal, positive steps"),  # a step of 2 nm is not equal to one of 0.2 nm
+        ([(X[::-1], Z)], "equal, positive steps"),
+        ([(np.random.default_rng(1).permutation(X), Z)], "equal, positive steps"),
+        ([(X[:15], Z[:15])], "equal, positive steps"),
+        ([(X, Z[:-1])], "equal, positive steps"),
+        ([(X[:, None], Z[:, None])], "equal, positive steps"),
+        ([(1.0, 2.0)], "equal, positive steps"),
+        ((X, Z), "a list of pairs"),
+        ([np.column_stack([X, Z])], "a list of pairs"),
+        ([(X, ["a"] * 256)], "a list of pairs"),
+        ([(X, 1e-9 + 3 * X)], "all the same, apart from its tilt"),
+    ],
+)
+def test_profiles_without_a_spectrum_are_refused(profiles, message):
+    assert len(merge_spectra(profiles=[(X, Z)]).power) > 2
+    with pytest.raises(ValueError, match=message):
+        merge_spectra(profiles=profiles)

@@ -38,7 +38,7 @@ def make_surface(output, *, name, seed, settings, height_map=None, sha256=None, 
         )
         surface = measured.surface
     elif settings["kind"] == "spectrum":
-        table = read_spectrum_table(height_map, settings["length_unit"])
+        table = read_spectrum_table(height_map, settings.get("length_unit"), settings.get("convention"))
         surface = table.in_cell(settings["period"]).realise(settings["grid"], seed, settings["amplitudes"])
     elif settings["kind"] == "smooth":
         heights = np.zeros((settings["grid"], settings["grid"]))
