@@ -23,7 +23,7 @@ MOST_FILLED = 0.05
 # if the ratio of rms slopes is larger than this value.
 MUCH_CURVATURE, ANISOTROPIC = 0.5, 1.5
 # A file may lack these keys. ICHA then assumes the values of GUESSES (in m), and shows those of EXAMPLES to the user.
-GUESSES = {"height_unit": 1e-9, "size": (1e-4, 1e-4), "scattered": "interpolate"}
+GUESSES = {"height_unit": 1e-9, "lateral_unit": 1e-6, "size": (1e-4, 1e-4), "scattered": "interpolate"}
 EXAMPLES = {"height_unit": "nm", "lateral_unit": "um", "size": "[90 um, 90 um]", "scattered": "interpolate"}
 # Lines of a text file, and characters of a line, that `icha new` prints.
 SHOWN_LINES, SHOWN_WIDTH = 6, 72
@@ -244,8 +244,4 @@ def _load(path: Path, data: str | None):
     if "size" in missing:
         rows, columns = scan.heights.shape  # most scans have square pixels
         guessed["size"] = columns * 1e-6, rows * 1e-6
-    elif "height_unit" in missing:
-        # Coordinates without a unit have the unit of the heights, but the file does not contain this unit either.
-        if load_scan(path, Preparation("auto", "free", data, **guessed, lateral_unit=1.0)).size != scan.size:
-            missing["lateral_unit"] = "is missing, and the file does not contain it; default: unit of the heights"
     return scan, guessed, missing

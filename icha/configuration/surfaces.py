@@ -279,8 +279,8 @@ class MeasuredSurface(_SurfaceFromFile):
     """Unit of the heights, such as `nm` or `0.1 mm`. Required for a file without this unit. The key replaces the
     unit in the file."""
     lateral_unit: UnitOfLength | None = None
-    """Unit of the coordinates x and y; with `format: fourier`, unit of 1/q. Default: the unit in the file. If the
-    file has no such unit, the default is the unit of the heights."""
+    """Unit of the coordinates x and y; with `format: fourier`, unit of 1/q. Default: the unit in the file. Required
+    if the file contains coordinates without a unit, and `size` is not given."""
     size: Sides | None = None
     """Size of the whole scan: one length, or a list of two lengths, along x and y. The size of a pixel is the size of
     the scan divided by the number of pixels. Required if the file does not contain the size. This key replaces the size

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scans import NM, SIZE, UM, centred, preparation, refused, write_xyz
+from scans import UM, centred, preparation, refused
 
 from icha.configuration.surfaces import MeasuredSurface
 from icha.configuration.topographies import inspect_file
@@ -245,20 +245,6 @@ def test_messages_have_units_of_people(prepared):
         prepared(np.eye(12, 16), size=(4e-6, 3e-6), crop=crop)
     with pytest.raises(UnfitTopography, match=r"requires a square scan .* 4 um x 3 um"):
         prepared(np.eye(12, 16), size=(4e-6, 3e-6), boundary="periodic")
-
-
-def test_where_coordinates_tell_the_size_their_unit_is_doubted(tmp_path):
-    """Coordinates in micrometres, taken for nanometres as the heights are."""
-    path = write_xyz(tmp_path / "scan.xyz")
-    crop = {"x": 0.0, "y": 0.0, "side": 2000 * UM}
-    with refused("crop", "units of 1 nm, see `lateral_unit`"):
-        prepared_topography(path, preparation(height_unit=NM, crop=crop))
-    given = preparation(height_unit=NM, lateral_unit=UM, crop=crop)
-    assert prepared_topography(path, given).surface.period == 4000 * UM
-    # Not where the size was given.
-    with pytest.raises(UnfitTopography) as raised:
-        prepared_topography(path, preparation(height_unit=NM, size=SIZE, crop=crop))
-    assert "lateral_unit" not in str(raised.value)
 
 
 def test_provenance_and_facts(prepared, tmp_path):

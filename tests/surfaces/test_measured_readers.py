@@ -38,7 +38,9 @@ def test_first_axis_exchanges_rows_and_cells(tmp_path):
 def test_xyz_in_any_order(tmp_path, separator):
     order = np.random.default_rng(8).permutation(HEIGHTS.size)
     path = write_xyz(tmp_path / "scan.xyz", order, separator)
-    assert_read(scan(path, height_unit=NM))
+    # Coordinates without a unit have no size.
+    with refused("lateral_unit", "or the `size` of the scan"):
+        scan(path, height_unit=NM)
     assert_read(scan(path.rename(tmp_path / "scan.txt"), height_unit=NM, lateral_unit=NM))
     # Coordinates in another unit than the heights; a size goes before both.
     wide = scan(tmp_path / "scan.txt", height_unit=NM, lateral_unit=UM)
@@ -57,7 +59,7 @@ def test_text_files_of_the_challenge(tmp_path):
     matrix = "\n".join(", ".join(f"{h:.5f}" for h in row) + "," for row in heights)
     (tmp_path / "surface.0008x0008.ASCII.dat").write_text(f"# surface\n{matrix}\n")
     for name, keys in (
-        ("surface.0008x0008.ASCII.xyz.dat", {}),
+        ("surface.0008x0008.ASCII.xyz.dat", {"lateral_unit": 1e-4}),
         ("surface.0008x0008.ASCII.dat", {"size": (1e-4, 1e-4)}),
     ):
         settings = preparation(boundary="periodic", height_unit=1e-4, touches_first="low", **keys)
@@ -70,7 +72,7 @@ def test_xyz_written_with_few_digits(tmp_path):
     y, x = np.mgrid[:40, :60] * 0.1953
     table = np.column_stack([x.ravel(), y.ravel(), np.arange(2400.0)])
     np.savetxt(tmp_path / "scan.xyz", table, fmt="%.2f")
-    read = scan(tmp_path / "scan.xyz", height_unit=UM)
+    read = scan(tmp_path / "scan.xyz", height_unit=UM, lateral_unit=UM)
     assert read.heights.shape == (40, 60)
     np.testing.assert_array_equal(read.heights.ravel(), np.arange(2400.0) * UM)
     np.testing.assert_allclose(read.size, [60 * 0.1953 * UM, 40 * 0.1953 * UM], rtol=1e-3)
@@ -192,7 +194,7 @@ def test_fourier_list_of_the_challenge(tmp_path, opposite, integers):
         np.column_stack([q, h.real, h.imag]),
         fmt=["%d"] * 2 + ["%.12e"] * 2 if integers else "%.12e",
     )
-    keys = {"size": (1e-4, 1e-4)} if integers else {}
+    keys = {"size": (1e-4, 1e-4)} if integers else {"lateral_unit": 1e-4}
     settings = preparation(
         format="fourier", boundary="periodic", height_unit=1e-4, grid=24, touches_first="low", **keys
     )

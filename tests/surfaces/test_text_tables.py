@@ -83,7 +83,7 @@ def test_headings_give_size_unit_and_missing_value(tmp_path, kind, encoding):
     if decimal:
         fields = [[field.replace(".", ",") for field in row] for row in fields]
     path = written(tmp_path, text(fields, "\t" if decimal else " ", heading), "scan.txt", encoding)
-    given = {} if whole else {"height_unit": NM}
+    given = {} if whole else {"height_unit": NM, "lateral_unit": NM}
     assert_heights(read(path, **({"height_unit": None, "size": None} | given)), missing=kind == "esri")
 
 
@@ -403,5 +403,5 @@ def test_titles_that_are_not_known_are_asked_about(tmp_path, titles):
         read(path, size=None, lateral_unit=UM)
     assert_heights(read(path, size=None, lateral_unit=UM, columns=(1, 2, 3)))
     path = written(tmp_path, text(points(), ",", ["x (px),y (px),z (nm)"]))
-    with refused("lateral_unit", "the unit of column x is 'px'"):
+    with refused("lateral_unit", "does not contain the unit of its coordinates"):
         read(path, size=None)

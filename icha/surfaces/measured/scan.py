@@ -53,7 +53,6 @@ class Scan:
     heights : (ny, nx) array, m, nan where missing; the first axis is y.
     size : sides (x, y) of the whole scan, m.
     steps : descriptions of how the file was read and of the later steps.
-    coordinate_unit : unit that is assumed for coordinates, m; None if the file contains the unit or the size.
     format : format with which the file was read.
     data : name of the array or channel that was read; empty if the file has only one.
     """
@@ -61,7 +60,6 @@ class Scan:
     heights: np.ndarray
     size: tuple[float, float]
     steps: tuple[str, ...] = ()
-    coordinate_unit: float | None = None
     format: str = ""
     data: str = ""
 
@@ -75,14 +73,6 @@ class Scan:
         """Return the scan after a step: new heights, added descriptions `steps`, and the new size (m) if given."""
         return replace(self, heights=heights, size=size or self.size, steps=(*self.steps, *steps))
 
-    @property
-    def remark_on_unit(self) -> str:
-        """Remark for messages about lengths: the unit that is assumed for coordinates; "" if the unit is known."""
-        if self.coordinate_unit is None:
-            return ""
-        unit = formatting.length(self.coordinate_unit)
-        return f"; the coordinates are assumed to be in units of {unit}, see `lateral_unit`"
-
 
 def load_scan(path: Path, settings: Preparation) -> Scan:
     """Read the scan in a file of any supported format; raises UnfitTopography if the file or a setting does not fit."""
@@ -95,10 +85,15 @@ def load_scan(path: Path, settings: Preparation) -> Scan:
             "height_unit",
             "is missing, and the file does not contain the unit of the heights; expected a unit such as 'um'",
         )
-    size, coordinate_unit = settings.size or found.size, None
+    size = settings.size or found.size
     if size is None and found.coordinates is not None:
-        coordinate_unit = settings.lateral_unit or unit
-        size = tuple(each * coordinate_unit for each in found.coordinates)
+        if settings.lateral_unit is None:
+            raise UnfitTopography(
+                "lateral_unit",
+                "is missing, and the file does not contain the unit of its coordinates; expected a unit such as 'um', "
+                "or the `size` of the scan",
+            )
+        size = tuple(each * settings.lateral_unit for each in found.coordinates)
     if size is None:
         raise UnfitTopography(
             "size", "is missing, and the file does not contain the size of the scan; expected a length such as '90 um'"
@@ -120,11 +115,9 @@ def load_scan(path: Path, settings: Preparation) -> Scan:
     ]
     format_ = f"{name} ({found.format})" if name == "instrument" else name
     steps = ("; ".join(filter(None, reading)),)
-    scan = Scan(found.heights.astype(float) * unit, tuple(size), steps, coordinate_unit, format_, found.data)
+    scan = Scan(found.heights.astype(float) * unit, tuple(size), steps, format_, found.data)
     if not all(np.isfinite(each) and LENGTH.contains(each) for each in size):
-        raise UnfitTopography(
-            "size", f"is {size[0]:g} m by {size[1]:g} m in the file{scan.remark_on_unit}; expected the size in this key"
-        )
+        raise UnfitTopography("size", f"is {size[0]:g} m by {size[1]:g} m in the file; expected the size in this key")
     return scan
 
 

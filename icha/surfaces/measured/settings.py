@@ -38,7 +38,7 @@ class Preparation:
     data : name of the variable, dataset or channel to read; None if the file has only one, or has a default.
     first_axis : "y" or "x", the first axis of arrays whose dimensions have no names.
     height_unit : unit of the heights, m; None for the unit in the file.
-    lateral_unit : unit of the coordinates, m; None for the unit in the file or, without one, the unit of the heights.
+    lateral_unit : unit of the coordinates, m; None for the unit in the file.
     size : sides (x, y) of the whole scan, m; None for the size in the file.
     touches_first : "high" or "low": points with high or with low numbers touch the elastic body first.
     missing : treatment of points without a height, "refuse" or "fill".

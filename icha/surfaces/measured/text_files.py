@@ -187,13 +187,7 @@ def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
     heading = _read_zygo(layout.heading) or _read_heading(layout, points.shape, settings)
     heights = np.full(nx * ny, np.nan)
     heights[node] = _mark_missing(points[:, 2], heading)
-    units = [titles[column - 1][1] if titles else "" for column in columns]
-    for axis, unit in zip("xy", units[:2], strict=True):
-        if unit and metres_of(unit) is None and settings.lateral_unit is None and settings.size is None:
-            raise UnfitTopography(
-                "lateral_unit", f"is missing, and the unit of column {axis} is {unit!r}; expected a length"
-            )
-    x_unit, y_unit, z_unit = (metres_of(unit) for unit in units)
+    x_unit, y_unit, z_unit = (metres_of(titles[column - 1][1]) if titles else None for column in columns)
     x_unit, y_unit = x_unit or heading.lateral_unit, y_unit or heading.lateral_unit
     remark = "columns x {}, y {}, z {} by their names".format(*columns)
     return FileContent(

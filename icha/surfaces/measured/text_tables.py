@@ -216,7 +216,11 @@ def _clean(line: str, delimiter: str = " ") -> str:
     """
     text = (_REMARK.split(line, maxsplit=1)[0] if "#" in line else line).strip(" \r\n\x1a")
     text = _FORTRAN.sub("e", _NAN.sub("nan", text.replace("−", "-")))
-    return re.sub(f" *{delimiter} *", delimiter, text) if delimiter != " " and " " in text else text
+    return (
+        re.sub(rf"[ \t]*{delimiter}[ \t]*" if delimiter in ",;" else " *\t *", delimiter, text)
+        if delimiter != " "
+        else text
+    )
 
 
 def strip_remark(line: str) -> str:
@@ -232,7 +236,7 @@ def _fields(text, delimiter):
         fields = next(csv.reader([text], delimiter=delimiter, skipinitialspace=True))
     else:
         fields = text.split(delimiter)
-    return [field.strip(' "') for field in fields]
+    return [field.strip(' "\t') for field in fields]
 
 
 def _count_fields(text, delimiter):

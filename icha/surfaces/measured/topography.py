@@ -138,12 +138,12 @@ def crop_square(scan: Scan, settings: Preparation) -> Scan:
             raise UnfitTopography(
                 "crop",
                 f"ends at x = {formatting.length(x + side)}, y = {formatting.length(y + side)}, outside the "
-                f"scan{scan.remark_on_unit}; expected at most x = {width}, y = {height}",
+                f"scan; expected at most x = {width}, y = {height}",
             )
     if nx < 8 or ny < 8:
         raise UnfitTopography(
             "crop" if settings.crop else "path",
-            f"gives a square of {nx} x {ny} points{scan.remark_on_unit}; expected at least 8 x 8",
+            f"gives a square of {nx} x {ny} points; expected at least 8 x 8",
         )
     if settings.boundary == PERIODIC and ((nx, ny) != (columns, rows) or abs(nx * dx / (ny * dy) - 1) > SQUARE):
         raise UnfitTopography(
@@ -302,7 +302,7 @@ def filter_short_waves(scan: Scan, settings: Preparation) -> Scan:
     if not least * (1 - 1e-9) <= settings.cutoff <= most:
         raise UnfitTopography(
             "cutoff",
-            f"is {settings.cutoff / max(scan.pixel):.3g} pixels{scan.remark_on_unit}; expected at least "
+            f"is {settings.cutoff / max(scan.pixel):.3g} pixels; expected at least "
             f"{LEAST_PIXELS} pixels ({formatting.length(least)}), at most the side of the square "
             f"({formatting.length(most)})",
         )
