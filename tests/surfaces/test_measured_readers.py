@@ -1,5 +1,8 @@
 """Readers of measured topographies, on files that are written here."""
 
+import struct
+import zipfile
+import zlib
 from pathlib import Path
 
 import h5py
@@ -232,6 +235,56 @@ def test_instrument_files_are_read_by_surface_topography(tmp_path):
     assert_read(scan(tmp_path / "scan.nc", format="instrument"))
     assert_read(scan(tmp_path / "scan.nc"))
     assert_read(scan(tmp_path / "scan.nc", format="instrument", height_unit=UM), UM * 1e-3)
+
+
+X3P = (
+    '<?xml version="1.0" encoding="UTF-8"?><p:ISO5436_2 xmlns:p="http://www.opengps.eu/2008/ISO5436_2"><Record1>'
+    "<Revision>{revision}</Revision><FeatureType>SUR</FeatureType><Axes>"
+    "<CX><AxisType>I</AxisType><DataType>D</DataType><Increment>2.5e-07</Increment><Offset>0</Offset></CX>"
+    "<CY><AxisType>I</AxisType><DataType>D</DataType><Increment>2.5e-07</Increment><Offset>0</Offset></CY>"
+    "<CZ><AxisType>A</AxisType><DataType>D</DataType><Increment>1</Increment><Offset>0</Offset></CZ></Axes></Record1>"
+    "<Record2><Date>2026-01-01T00:00:00</Date></Record2><Record3><MatrixDimension><SizeX>{nx}</SizeX><SizeY>{ny}</SizeY><SizeZ>1</SizeZ></MatrixDimension>"
+    "<DataLink><PointDataLink>bindata/data.bin</PointDataLink></DataLink></Record3></p:ISO5436_2>"
+)
+
+
+@pytest.mark.parametrize("revision", ["ISO5436 - 2000", "ISO5436 – 2000", "ISO5436-2000"])
+@pytest.mark.parametrize("folder", ["", "scan/", "scan\\"])
+def test_x3p_as_other_programs_write_it(tmp_path, revision, folder):
+    data = HEIGHTS.copy() * NM
+    data[3, 7] = np.nan
+    separator = "\\" if "\\" in folder else "/"
+    with zipfile.ZipFile(tmp_path / "scan.x3p", "w", zipfile.ZIP_DEFLATED) as file:
+        file.writestr("__MACOSX/scan/._main.xml", "rubbish")
+        file.writestr(f"{folder}main.xml", X3P.format(revision=revision, nx=COLUMNS, ny=ROWS))
+        file.writestr(f"{folder}bindata{separator}data.bin", data.astype("<f8").tobytes())
+    read = scan(tmp_path / "scan.x3p")
+    assert np.argwhere(np.isnan(read.heights)).tolist() == [[3, 7]]
+    np.testing.assert_allclose(np.nan_to_num(read.heights), np.nan_to_num(data), rtol=1e-12)
+    np.testing.assert_allclose(read.size, SIZE)
+
+
+@pytest.mark.parametrize("streams", [0, 1, 3])
+def test_sur_of_digital_surf_with_and_without_compression(tmp_path, streams):
+    raw = np.rint(HEIGHTS * 1e4).astype("<i4").tobytes()
+    comment, private = b"a comment", b"private"
+    head = struct.pack("<12s4H", b"DSCOMPRESSED" if streams else b"DIGITAL SURF", 0, 1, 1, 2).ljust(98, b"\0")
+    head += struct.pack("<H2i2iI3f", 32, -(10**6), 10**6, COLUMNS, ROWS, HEIGHTS.size, 0.25, 0.25, 1e-4)
+    units = [b"\xb5m", b"\xb5m", b"nm"]
+    head += b"".join(text.ljust(16, b"\0") for text in (b"X", b"Y", b"Z", *units, *units))
+    head += struct.pack("<3f3H", 1, 1, 1, 0, 0, 0).ljust(18 + 12, b"\0")
+    head = (head + struct.pack("<7H", 0, 0, 0, 1, 1, 2026, 1)).ljust(334, b"\0")
+    head = (head + struct.pack("<2H", len(comment), len(private))).ljust(512, b"\0") + comment + private
+    if streams:
+        parts = [raw[k::1][: len(raw) // streams] for k in range(0, len(raw), len(raw) // streams)]
+        packed = [zlib.compress(part) for part in parts]
+        lengths = [number for pair in zip(map(len, parts), map(len, packed), strict=True) for number in pair]
+        raw = struct.pack(f"<{1 + len(lengths)}I", len(parts), *lengths) + b"".join(packed)
+    (tmp_path / "scan.sur").write_bytes(head + raw)
+    read = scan(tmp_path / "scan.sur")
+    # The file has the digits of single precision.
+    np.testing.assert_allclose(read.heights, HEIGHTS * NM, rtol=1e-6)
+    np.testing.assert_allclose(read.size, SIZE, rtol=1e-6)
 
 
 def test_instrument_file_by_its_content(tmp_path):

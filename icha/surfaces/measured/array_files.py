@@ -1,7 +1,12 @@
 """Read heights from NumPy, MATLAB, netCDF and HDF5 files, and from formats that SurfaceTopography supports."""
 
 import contextlib
+import io
 import math
+import re
+import struct
+import zipfile
+import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -254,9 +259,50 @@ def open_instrument(path: Path):
     from SurfaceTopography.Exceptions import CannotDetectFileFormat
 
     try:
-        return open_topography(str(path))
+        return open_topography(_plain_x3p(path) or _plain_sur(path) or str(path))
     except CannotDetectFileFormat:
         return None
+
+
+def _plain_x3p(path: Path) -> io.BytesIO | None:
+    """Return an x3p file as SurfaceTopography requires it; None for other files.
+
+    Some programs put all entries of the archive into a folder, or write the revision of the standard with a dash.
+    """
+    if not zipfile.is_zipfile(path):
+        return None
+    with zipfile.ZipFile(path) as archive:
+        entries = {entry.filename.replace("\\", "/"): entry for entry in archive.infolist()}
+        main = min((name for name in entries if Path(name).name == "main.xml"), key=len, default=None)
+        if main is None or b"ISO5436_2" not in (content := archive.read(entries[main])):
+            return None
+        require_room(_COPIES * sum(entry.file_size for entry in entries.values()))
+        plain = io.BytesIO()
+        with zipfile.ZipFile(plain, "w") as copy:
+            for name, entry in entries.items():
+                if name != main:
+                    copy.writestr(name.removeprefix(main.removesuffix("main.xml")), archive.read(entry))
+            copy.writestr("main.xml", re.sub(rb"(<Revision>)[^<]*", rb"\1ISO5436 - 2000", content))
+    plain.seek(0)
+    return plain
+
+
+def _plain_sur(path: Path) -> io.BytesIO | None:
+    """Return a compressed file of Digital Surf as an uncompressed one, as in RosettaSciIO; None for other files."""
+    with path.open("rb") as file:
+        head = file.read(512)
+        if not head.startswith(b"DSCOMPRESSED") or len(head) < 512:
+            return None
+        comments = file.read(sum(struct.unpack("<2H", head[334:338])))
+        (count,) = struct.unpack("<I", file.read(4))
+        lengths = list(struct.iter_unpack("<2I", file.read(8 * count)))
+        require_room(_COPIES * sum(length for length, _ in lengths))
+        plain = io.BytesIO(b"DIGITAL SURF" + head[12:] + comments)
+        plain.seek(0, io.SEEK_END)
+        for length, compressed in lengths:
+            plain.write(zlib.decompressobj().decompress(file.read(compressed), length))
+    plain.seek(0)
+    return plain
 
 
 def is_instrument_text(file) -> bool:
