@@ -235,7 +235,7 @@ def _dataset(surface, material, path, name, seed, record, summits, reasons, of_c
     values = {
         **{axis: nodes for axis in ("x", "y") if axis in table},
         **_path_values(table, path, record, surface.grid),
-        **_indenter_values(surface, record.steps),
+        **_indenter_values(surface, material, record.steps),
         **_surface_values(surface, material, seed),
         **of_contact,
         "asperity_count": len(summits),
@@ -485,13 +485,14 @@ def _path_values(table: Table, path: Path, record: _PathRecord, grid: int) -> di
     }
 
 
-def _indenter_values(surface: Surface, steps: Sequence[dict]) -> dict:
-    """Return the values of all steps as experiments have them, and the shape, by variable name; {} if periodic."""
+def _indenter_values(surface: Surface, material: Material, steps: Sequence[dict]) -> dict:
+    """Return the values of all steps as experiments have them, shape and layer, by variable name; {} if periodic."""
     if not surface.free:
         return {}
     # Models leave out values that they do not have.
     names = [name for name, described in INDENTER.items() if described.dims and (not steps or name in steps[0])]
     values = stack_rows({name: INDENTER[name] for name in names}, steps, "step") if steps else {}
+    values["layer_thickness"] = material.thickness
     if surface.shape is not None:
         values["shape"] = describe_shape(surface.shape)
     radius = sphere_radius(surface)

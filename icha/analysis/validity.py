@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -290,7 +290,37 @@ def statements_on_dataset(campaign: xr.DataTree) -> list[Statement]:
                 found = study["stickiness"].sel(surface=surface, material=material)
                 sticky[surface, material] = max(float(found.max()), sticky.get((surface, material), 0.0))
     outside = _describe_shares(shares) if shares else None
-    return [*statements(models, cases, outside, describe_sticky(sticky)), *_not_applicable(campaign)]
+    found = statements(models, cases, outside, describe_sticky(sticky))
+    return [*found, *describe_layers(_radii_on_layers(campaign)), *_not_applicable(campaign)]
+
+
+def describe_layers(shares: Mapping[str, float]) -> Iterator[Statement]:
+    """Yield a statement if shapes are pressed on layers, where the laws of a half-space do not hold.
+
+    shares : contact radius divided by the thickness of the layer, by names of material and surface.
+    """
+    if shares:
+        radii = join_first(f"{share:.2g} of the thickness for {name}" for name, share in shares.items())
+        text = (
+            f"the contact radius is {radii}; the laws of Hertz and JKR are for half-spaces: on a layer they do not give"
+            " force, radius and pull-off, and no ratio to JKR is computed"
+        )
+        yield Statement("layer", text, False)
+
+
+def _radii_on_layers(campaign):
+    """Return the largest contact radius of shapes on layers, over the thickness, by names of material and surface."""
+    shares = {}
+    for node in campaign.children.values():
+        if "layer_thickness" in node and "shape" in node:
+            study = node.to_dataset()[["contact_radius", "layer_thickness"]].load()
+            share = study["contact_radius"] / study["layer_thickness"]
+            share = share.max([name for name in share.dims if name not in ("surface", "material")])
+            share = share.where(share > 0).transpose("surface", "material")
+            for (surface, material), value in share.to_series().dropna().items():
+                name = f"{material} on {surface}"
+                shares[name] = max(value, shares.get(name, 0.0))
+    return shares
 
 
 def _not_applicable(campaign):

@@ -280,10 +280,10 @@ class BoundaryElements(FullContactProblem):
 
     def _energy_of_lone_cells(self, state, chosen):
         """Return the energy of chosen cells as in `_energy_of_cells`, J/m^2, without pressure on other cells."""
-        cells, pressure = state.cells[chosen], state.pressure[chosen]
-        displaced = self.space.displacement(cells, pressure / self.contact_modulus, cells) * self.spacing
-        areas = adhesive_areas(state.fraction[chosen], state.mean_fraction[chosen])
-        return 0.5 * pressure * displaced - self.law.material.surface_energy * areas
+        others, cells, pressure = ~chosen, state.cells[chosen], state.pressure[chosen]
+        by_others = state.pressure[others] / self.contact_modulus
+        displaced = self.space.displacement(state.cells[others], by_others, cells) * self.spacing
+        return self._energy_of_cells(state)[chosen] - 0.5 * pressure * displaced
 
     def _energy_of_cells(self, state):
         """Return the elastic energy minus the work of adhesion of each cell in contact, (k,), J/m^2."""

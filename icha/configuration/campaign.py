@@ -28,7 +28,7 @@ from icha.configuration.studies import (
 from icha.configuration.surfaces import AnySurface, MaterialSection
 from icha.contact.models import MODELS
 from icha.datasets.labels import is_derived_study
-from icha.path.targets import FORCE, INDENTATION, QUANTITIES, WITHOUT_ADHESION, Target
+from icha.path.targets import CONTACT_RADIUS, FORCE, INDENTATION, WITHOUT_ADHESION, Target
 from icha.support import formatting
 from icha.support.tables import read_columns
 from icha.support.values import Name, Problem, Section, Text, distinct
@@ -316,28 +316,41 @@ class Campaign(Section):
             if Target(kind, value).needs_adhesion and (value < 0 or location[0] != "turning_points"):
                 yield location, value, f"{WITHOUT_ADHESION} of {without[0]!r}"
 
-    def _edge_problems(self, study: Study) -> Iterator[Problem]:
-        """Yield a problem for each sphere whose contact is larger than its square, by the theory of JKR or Hertz."""
-        kind, value = study.targets.last
-        spheres = {name: self.surfaces[name].shape for name in study.surfaces if self.surfaces[name].shape}
-        for (name, shape), label in itertools.product(spheres.items(), study.materials):
-            radius, material = shape.shape.sphere_radius, self.materials[label]
-            side = getattr(self._grid_and_period(name), "period", math.inf)
-            if radius is None or material.thickness or kind not in (FORCE, INDENTATION):
-                continue
-            from icha.references import indentation
+    def contact_radii(self, study: Study, surface: str, material: str) -> dict[tuple, float]:
+        """Return the radii (m) of the contacts that theory expects of a smooth shape, by location of kind and value.
 
-            contact_radius = {
-                FORCE: indentation.sphere_radius_at_force,
-                INDENTATION: indentation.sphere_radius_at_indentation,
-            }[kind]
-            a = float(contact_radius(value, radius, material.contact_modulus, material.surface_energy))
-            if 2 * a > side:
-                radius, given, least = (formatting.length(each, 3) for each in (a, side, 3 * a))
-                reason = f"gives {label!r} on {name!r} a contact radius of about {radius}, but the square has the side "
-                reason += f"{given}; expected a side of at least {least}, or smaller targets"
-                key = QUANTITIES[kind].plural
-                yield ("targets", key, len(getattr(study.targets, key)) - 1), value, reason
+        The locations are those of targets and turning points; () is the contact after the jump-in, with adhesion. On a
+        layer, only the radii at indentations are expected, because the contact is larger than on a half-space.
+        """
+        from icha.references.indentation import contact_radius_at
+
+        shape, section = self.surfaces[surface].shape.shape, self.materials[material]
+
+        def radius(kind, value):
+            if kind == CONTACT_RADIUS:
+                return value
+            return contact_radius_at(kind, value, shape, section.contact_modulus, section.surface_energy)
+
+        known = (INDENTATION, CONTACT_RADIUS) + ((FORCE,) if not section.thickness else ())
+        radii = {(): radius(INDENTATION, 0.0)} if section.surface_energy else {}
+        return radii | {at: radius(kind, value) for at, kind, value in study.states() if kind in known}
+
+    def _edge_problems(self, study: Study) -> Iterator[Problem]:
+        """Yield a problem for each shape whose contact is larger than its square, by the theory of smooth shapes."""
+        values = {location: value for location, _, value in study.states()} | {(): study.surfaces}
+        for name, label in itertools.product(study.surfaces, study.materials):
+            side = getattr(self._grid_and_period(name), "period", math.inf)
+            if not self.surfaces[name].shape:
+                continue
+            for location, a in self.contact_radii(study, name, label).items():
+                # Roughness may prevent the jump-in of the smooth shape.
+                if 2 * a > side and (location or self.surfaces[name].smooth):
+                    radius, given, least = (formatting.length(each, 3) for each in (a, side, 3 * a))
+                    reason = f"gives {label!r} on {name!r} a contact radius of about {radius}"
+                    reason += "" if location else " after the jump-in"
+                    reason += f", but the square has the side {given}; expected a side of at least {least}"
+                    yield location or ("surfaces",), values[location], f"{reason}, or smaller targets"
+                    break
 
     def resolve_paths(self, folder: FilePath) -> Campaign:
         """Return the campaign with `folder` added in front of all paths of files."""

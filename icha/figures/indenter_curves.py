@@ -88,8 +88,8 @@ def first_run(series: list[Series]) -> xr.Dataset:
 
 
 def sphere_of(run: xr.Dataset) -> tuple[float, float, float] | None:
-    """Return radius (m), contact modulus (Pa) and work of adhesion (J/m^2) of a run; None without a radius."""
-    if "shape_radius" not in run:
+    """Return radius (m), modulus (Pa) and work of adhesion (J/m^2) of a run; None without a radius or on a layer."""
+    if "shape_radius" not in run or np.isfinite(run["layer_thickness"]):
         return None
     return tuple(float(run[name]) for name in ("shape_radius", "contact_modulus", "surface_energy"))
 

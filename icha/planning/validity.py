@@ -15,6 +15,7 @@ from icha.analysis.validity import (
     THEORETICAL,
     Case,
     Statement,
+    describe_layers,
     describe_sticky,
     join_first,
     statements,
@@ -43,6 +44,8 @@ from icha.surfaces.moments import (
 
 # Least number of cells in the contact radius at zero load for a pull-off force within a per cent (docs/indenter.md).
 _LEAST_CELLS = 10
+# Largest contact radius of an indenter, divided by the side of its square (docs/howto/indenter.md).
+_LARGEST_SHARE = 1 / 3
 # Radius of the mean summit of a Gaussian surface, multiplied by the rms curvature of the surface (McCool 1986).
 # icha.references.summit_theories also contains this number, but takes long to import.
 _SUMMIT_RADIUS = 3 * math.sqrt(math.pi) / 8
@@ -165,28 +168,44 @@ def _default_ranges(campaign):
 
 
 def _indenters(campaign):
-    """Yield a statement for each sphere and adhesive material: what a smooth sphere would do by the theory of JKR."""
-    contacts = dict.fromkeys((case.surface, case.material) for case in run_cases(campaign))
-    stated = set()
-    for surface, name in contacts:
-        shape, material = campaign.surfaces[surface].shape, campaign.materials[name]
-        radius = shape.shape.sphere_radius if shape else None
-        same = radius, name, campaign.period(surface) / campaign.grid(surface)
-        if radius is None or not material.surface_energy or material.thickness or same in stated:
+    """Yield a statement for each shape and material: the contact of the smooth shape by theory, beside the square."""
+    from icha.references.indentation import contact_radius_at, pull_off_force, theory_of
+
+    largest, layers = {}, {}
+    for study, surface, name in dict.fromkeys(
+        (case.study, case.surface, case.material) for case in run_cases(campaign)
+    ):
+        if campaign.surfaces[surface].shape and not is_derived_study(study, campaign.studies):
+            radii = campaign.contact_radii(campaign.studies[study], surface, name).values()
+            largest[surface, name] = max(0.0, *radii, largest.get((surface, name), 0.0))
+    for (surface, name), radius in largest.items():
+        shape, material = campaign.surfaces[surface].shape.shape, campaign.materials[name]
+        side, energy = campaign.period(surface), material.surface_energy
+        properties = shape, material.contact_modulus, energy
+        cells = campaign.grid(surface) / side
+        at_rest = contact_radius_at("force", 0.0, *properties) if energy else 0.0
+        if material.thickness:
+            layers[f"{name} on {surface} (as on a half-space)"] = max(radius, at_rest) / material.thickness
             continue
-        stated.add(same)
-        force = 1.5 * math.pi * material.surface_energy * radius
-        contact = math.cbrt(4.5 * math.pi * material.surface_energy * radius**2 / material.contact_modulus)
-        cell = campaign.period(surface) / campaign.grid(surface)
-        tabor = math.cbrt((material.surface_energy / material.contact_modulus) ** 2 * radius)
-        long_range = describe_short_range(tabor / material.interaction_range)
+        found = [f"at most {format_quantity(max(radius, at_rest), 'm')}"] if radius else []
+        if energy:
+            jumped = format_quantity(contact_radius_at("indentation", 0.0, *properties), "m")
+            at_zero = f"{format_quantity(at_rest, 'm')} ({at_rest * cells:.2g} cells) at zero load"
+            found = [f"{jumped} after the jump-in", at_zero, *found]
+        force = pull_off_force(*properties)
+        pull_off = f"a pull-off force of {format_quantity(force, 'N')}, and " if force else ""
         text = (
-            f"by the theory of JKR, {name} adheres to a smooth sphere of radius {format_quantity(radius, 'm')} with a "
-            f"pull-off force of {format_quantity(force, 'N')}; at zero load the contact radius is "
-            f"{format_quantity(contact, 'm')} ({contact / cell:.2g} cells of {surface})"
-            f"{f'. JKR does not hold: {long_range}' if long_range else ''}"
+            f"by the theory of {theory_of(shape, adhesive=energy > 0)}, {name} on {surface} without roughness has "
+            f"{pull_off}a contact radius of {', '.join(found)}; half the side is {format_quantity(side / 2, 'm')}"
         )
-        yield Statement("indenter", text, contact >= _LEAST_CELLS * cell and not long_range)
+        enough = not energy or at_rest * cells >= _LEAST_CELLS
+        if energy and shape.sphere_radius:
+            tabor = math.cbrt((energy / material.contact_modulus) ** 2 * shape.sphere_radius)
+            if long_range := describe_short_range(tabor / material.interaction_range):
+                text, enough = f"{text}. JKR does not hold: {long_range}", False
+        if found:
+            yield Statement("indenter", text, enough and max(radius, at_rest) <= _LARGEST_SHARE * side)
+    yield from describe_layers(layers)
 
 
 def _describe_outside(tabor):

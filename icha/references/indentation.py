@@ -15,6 +15,7 @@ positive in compression, indentations are positive towards the half-space.
 """
 
 import math
+import sys
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -24,7 +25,7 @@ from scipy.special import struve
 
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
-from icha.surfaces.shapes import Wave
+from icha.surfaces.shapes import Cone, CylinderPunch, FlatPunch, Shape, Wave
 
 HERTZ = "H. Hertz, J. Reine Angew. Math. 92 (1882) 156; K. L. Johnson, Contact Mechanics, Cambridge 1985, chapter 4"
 JOHNSON_KENDALL_ROBERTS = (
@@ -152,6 +153,57 @@ def sphere_jump_off(radius, contact_modulus, work_of_adhesion) -> ContactState:
     """
     a = np.cbrt(np.pi / 8 * radius**2 * work_of_adhesion / contact_modulus)
     return ContactState(a, -3 * a**2 / radius, -5 / 6 * np.pi * radius * work_of_adhesion)
+
+
+def contact_radius_at(quantity: str, value: float, shape: Shape, contact_modulus, work_of_adhesion=0.0) -> float:
+    """Return the radius (m) of the largest contact of a smooth shape at a force (N) or indentation (m).
+
+    The result is not a number if theory has no such contact. For spheres, paraboloids and waves it is that of Hertz and
+    JKR, for cones that of Sneddon, Maugis & Barquins, and for flat ends the radius or half side of the end.
+
+    Parameters
+    ----------
+    quantity : "force" or "indentation".
+    value : value of the quantity.
+    """
+    if isinstance(shape, (CylinderPunch, FlatPunch)):
+        return shape.radius if isinstance(shape, CylinderPunch) else shape.side / 2
+    material = contact_modulus, work_of_adhesion
+    if not isinstance(shape, Cone):
+        by_radius = {"force": sphere_radius_at_force, "indentation": sphere_radius_at_indentation}[quantity]
+        return float(by_radius(value, shape.sphere_radius, *material))
+    # Between the radius of the smallest value and infinity, the value grows with the radius.
+    smallest = {"force": cone_pull_off, "indentation": cone_jump_off}[quantity](shape.half_angle, *material)
+    lower = upper = float(smallest.contact_radius) or math.sqrt(sys.float_info.min)
+
+    def excess(radius):
+        return float(getattr(cone_contact(radius, shape.half_angle, *material), quantity)) - value
+
+    if excess(lower) > 0:
+        return math.nan
+    while excess(upper) <= 0:
+        upper *= 2
+    return brentq(excess, lower, upper)
+
+
+def pull_off_force(shape: Shape, contact_modulus, work_of_adhesion) -> float:
+    """Return the pull-off force of a smooth shape, N, by the theories of `contact_radius_at`; 0 for a square end."""
+    if isinstance(shape, FlatPunch):
+        return 0.0
+    if isinstance(shape, CylinderPunch):
+        return -float(punch_pull_off(shape.radius, contact_modulus, work_of_adhesion).force)
+    if isinstance(shape, Cone):
+        return -float(cone_pull_off(shape.half_angle, contact_modulus, work_of_adhesion).force)
+    return -float(sphere_pull_off(shape.sphere_radius, contact_modulus, work_of_adhesion).force)
+
+
+def theory_of(shape: Shape, *, adhesive: bool) -> str:
+    """Return the authors of the theory by which `contact_radius_at` describes a shape."""
+    if isinstance(shape, (CylinderPunch, FlatPunch)):
+        return "Kendall" if adhesive else "Boussinesq"
+    if isinstance(shape, Cone):
+        return "Maugis and Barquins" if adhesive else "Sneddon"
+    return "JKR" if adhesive else "Hertz"
 
 
 def punch_force(indentation, punch_radius, contact_modulus):

@@ -5,10 +5,12 @@ import pytest
 from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import nnls
 
-from icha import Material, SelfAffineSpectrum, Surface
+from icha import Material, Path, SelfAffineSpectrum, Surface
 from icha.boundary_elements.contact import contact_of
+from icha.contact.model import JUMP_IN, JUMP_OFF
+from icha.path.follow import follow
 from icha.references.indentation import elliptic_pull_off
-from icha.surfaces.shapes import Paraboloid
+from icha.surfaces.shapes import Paraboloid, Sphere
 from validation import indenter_contacts as contacts
 from validation import rough_indenters
 from validation.single_contacts import largest_tension
@@ -102,3 +104,16 @@ def _mean_inverse_distance(grid):
 def test_sphere_on_a_layer_has_the_limits_of_thick_and_thin():
     for row in rough_indenters.layer_limits(48, (100, 0.1)):
         assert abs(row["force_error"]) < 0.02, row
+
+
+@pytest.mark.parametrize("thickness", [np.inf, 0.4])
+def test_jumps_of_a_lone_patch_release_the_change_of_the_stored_energy(thickness):
+    """Bonds at the front store energy too; on a layer they store most of the energy of the last patch."""
+    surface = Surface(np.zeros((48, 48)), period=0.8, boundary="free", shape=Sphere(1.0))
+    layer = Material(1e6, 1e3, interaction_range=1e-4, thickness=thickness, poisson_ratio=0.4)
+    contact = contact_of(surface, layer)
+    path = Path(indentations=[0.002], unload=True)
+    steps = [each.step for each in follow(contact, path) if each.step is not None and len(each.step.events)]
+    assert [each.events.kind.tolist() for each in steps] == [[JUMP_IN], [JUMP_OFF]]
+    for step in steps:
+        assert step.events.energy.sum() / contact.area == pytest.approx(step.loss, rel=1e-2)

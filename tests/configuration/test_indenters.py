@@ -105,6 +105,40 @@ def test_contacts_larger_than_the_square_are_refused(targets, radius, refused):
     refused("", changes, f"gives 'soft' on 'rough' a contact radius of about {radius} um, but the square has the side")
 
 
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        # Radius of JKR at the indentation 0: a^3 = 2 pi w R^2/E*, with 50 mJ/m^2, 10 mm and 25 MPa.
+        (
+            {"surfaces.ball.shape": {"sphere": {"radius": "10 mm"}}},
+            "one.surfaces: ['ball'] gives 'soft' on 'ball' a contact radius of about 108 um after the jump-in",
+        ),
+        # Sneddon's cone: a^2 = 2 F tan(80 deg)/(pi E*).
+        (
+            {
+                "surfaces.ball.shape": {"cone": {"half_angle": "80 deg"}},
+                "materials.soft.surface_energy": "0 J/m^2",
+                "studies.one.targets": {"forces": ["1 mN", "100 mN"]},
+            },
+            "one.targets.forces[1]: '100 mN' gives 'soft' on 'ball' a contact radius of about 120 um",
+        ),
+        (
+            {"studies.one.turning_points": [{"force": "-1 uN"}, {"force": "50 mN"}]},
+            "one.turning_points[1].force: '50 mN' gives 'soft' on 'ball' a contact radius of about",
+        ),
+        (
+            {"studies.one.targets": {"contact_radii": ["101 um"]}},
+            "contact_radii[0]: '101 um' gives 'soft' on 'ball' a c",
+        ),
+    ],
+    ids=["jump-in", "cone", "turning point", "radius"],
+)
+def test_contacts_that_reach_the_edges_are_refused(changes, message, refused):
+    alone = {"surfaces.ball": dict(BALL), "studies.one.surfaces": ["ball"], "studies.one.rms_slopes": None}
+    study = {"studies.one.targets": {"forces": ["0.1 mN"]}, "studies.one.snapshots": None}
+    refused("", alone | BY_CELLS | study | changes, message)
+
+
 def test_an_unusual_youngs_modulus_is_refused(refused):
     bodies = [{"youngs_modulus": "2 mPa", "poisson_ratio": 0.5}, "rigid"]
     changes = {"materials.soft.contact_modulus": None, "materials.soft.bodies": bodies}

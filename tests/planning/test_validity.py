@@ -78,3 +78,36 @@ def test_surfaces_that_stick_are_named_before_the_run(tmp_path):
     exact = stickiness(moments, Material(1e6, 0.5, 8e-9))
     told = re.fullmatch(r"attraction outweighs repulsion: inside on rough \(stickiness (\S+)\); .*", said.text)
     assert exact > 1 and float(told.group(1)) == pytest.approx(exact, rel=0.1) and not said.good
+
+
+INDENTERS = """
+name: indenters
+title: Indenters
+summary: For tests.
+license: CC0-1.0
+surfaces:
+  ball: {kind: smooth, side: 400 um, grid: 64, shape: {sphere: {radius: 1 mm}}}
+  punch: {kind: smooth, side: 400 um, grid: 64, shape: {cylinder_punch: {radius: 100 um}}}
+materials:
+  rubber: {contact_modulus: 2.7 MPa, surface_energy: 50 mJ/m^2, interaction_range: 2 nm}
+  film: {contact_modulus: 2.7 MPa, surface_energy: 50 mJ/m^2, thickness: 32 um, poisson_ratio: 0.5}
+studies:
+  test:
+    surfaces: [ball, punch]
+    materials: [rubber, film]
+    models: [boundary_elements]
+    targets: {forces: [0 mN, 0.2 mN]}
+"""
+
+
+def test_contacts_of_indenters_are_compared_with_the_square_and_the_layer(tmp_path):
+    """JKR at zero load: a^3 = 9 pi w R^2/(2 E*); at the indentation 0: a^3 = 2 pi w R^2/E*. Kendall: 8 pi E* w a^3."""
+    (tmp_path / "indenters.yaml").write_text(INDENTERS)
+    said = [each for each in expected_validity(load_configuration(tmp_path / "indenters.yaml").campaign)]
+    ball, punch = (each.text for each in said if each.about == "indenter")
+    at_rest, jumped = ((factor * np.pi * 0.05 * 1e-6 / 2.7e6) ** (1 / 3) * 1e6 for factor in (4.5, 2))
+    assert f"pull-off force of 235.6 µN, and a contact radius of {jumped:.4g} µm after the jump-in, " in ball
+    assert f"{at_rest:.4g} µm (10 cells) at zero load, at most 71.43 µm; half the side is 200 µm" in ball
+    assert f"theory of Kendall, rubber on punch without roughness has a pull-off force of {1.842:g} mN" in punch
+    (layer,) = (each for each in said if each.about == "layer")
+    assert f"{at_rest / 32:.2g} of the thickness for film on ball (as on a half-space)" in layer.text and not layer.good

@@ -8,6 +8,7 @@ import pytest
 import icha
 from icha.boundary_elements.observables import hull_area
 from icha.equilibrium.distributions import edge_share
+from icha.figures.indenter_curves import sphere_of
 from icha.references import indentation as closed
 from icha.references.indenter_runs import loop_values, spaced_states
 from icha.simulation import asperity_applicability
@@ -88,6 +89,7 @@ def test_run_of_a_smooth_sphere_has_the_values_of_jkr(model):
     run = icha.simulate(SMOOTH, material, icha.Path(contact_radii=[9e-6], unload=True), model=model)
     assert "failed_checks" not in run.attrs and run.attrs["applicability"] == ""
     assert str(run["shape"].values) == "sphere of radius 0.001 m" and run["shape_radius"] == RADIUS
+    assert np.isinf(run["layer_thickness"]) and sphere_of(run) == (RADIUS, MODULUS, energy)
     # Boundary elements with few cells are accurate to a few per cent.
     accuracy = 1e-9 if model == "asperities" else 0.03
     assert float(run["pull_off_force_over_jkr"]) == pytest.approx(1, abs=accuracy)
@@ -151,3 +153,11 @@ def test_asperities_under_a_shape_need_roughness_that_stays_apart():
     assert asperity_applicability(1.5) == ""
     assert "less than 2" in asperity_applicability(1.5, conformal=True)
     assert asperity_applicability(2.5, conformal=True) == ""
+
+
+def test_runs_on_layers_have_their_thickness_and_nothing_is_compared_with_jkr():
+    energy = (4e-6) ** 3 * MODULUS / RADIUS**2
+    layer = icha.Material(MODULUS, energy, 1e-12, thickness=1e-5)
+    run = icha.simulate(SMOOTH, layer, icha.Path(contact_radii=[9e-6], unload=True), model="boundary_elements")
+    assert run["layer_thickness"] == 1e-5 and "pull_off_force_over_jkr" not in run
+    assert sphere_of(run) is None, "figures draw no curves of Hertz and JKR"

@@ -49,7 +49,7 @@ _TOPOGRAPHY = ("surface", "seed", "rms_slope")
 # Runs of a study have the same snapshot targets. Bins are fixed in units of h_rms (gap) and of E* h'_rms (pressure).
 VARIES_WITH = {
     **dict.fromkeys(("contact_modulus", "surface_energy", "interaction_range", "flaw_radius"), ("material",)),
-    **dict.fromkeys(("theoretical_strength", "interface_strength"), ("material",)),
+    **dict.fromkeys(("theoretical_strength", "interface_strength", "layer_thickness"), ("material",)),
     **dict.fromkeys(("rms_height", "rms_curvature", "unit_height", "unit_slope", "nayak_parameter"), _TOPOGRAPHY),
     **dict.fromkeys(("spectral_moment_0", "spectral_moment_2", "spectral_moment_4"), _TOPOGRAPHY),
     **dict.fromkeys(("height_skewness", "height_kurtosis", "slope_anisotropy"), _TOPOGRAPHY),
