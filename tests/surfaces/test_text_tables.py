@@ -28,7 +28,7 @@ def text(fields, delimiter=",", heading=()):
 def read(path, **keys):
     """Prepare the surface of a text without removing a trend."""
     given = {"height_unit": NM, "size": (SIDE, SIDE)} | keys
-    settings = Preparation(format="auto", boundary="periodic", missing="fill", **given)
+    settings = Preparation(**{"format": "auto", "boundary": "periodic", "missing": "fill"} | given)
     return prepared_topography(path, vars(settings))
 
 
@@ -182,12 +182,13 @@ def test_a_row_of_missing_heights_is_a_row(tmp_path, delimiter, word, place):
 
 def test_delimiters_at_the_end_of_all_lines(tmp_path):
     fields = [[*row, ""] for row in rows()]
-    prepared = read(written(tmp_path, text(fields)))
-    assert_heights(prepared)
-    assert "',' at the end of every line left out" in prepared.reading
     fields[3][4] = ""
+    assert_heights(read(written(tmp_path, text(fields))), missing=1)
+    # The last column, of missing heights.
     with refused("path", "the last column may be missing heights, or no column"):
-        read(written(tmp_path, text(fields)))
+        read(written(tmp_path, text([[*row[:-1], ""] for row in rows()])))
+    lines = [[*line, ""] for line in points()]
+    assert_heights(read(written(tmp_path, text(lines), "scan.xyz"), size=None, lateral_unit=UM))
 
 
 def test_several_images_in_a_text_are_refused(tmp_path):
@@ -319,6 +320,13 @@ def test_grids_of_esri_and_surfer_in_lines_of_any_length(tmp_path, wrap):
         assert_heights(read(path, size=None, lateral_unit=UM), missing=1)
         with refused("path", "numbers in the last row|23 rows of numbers"):
             read(written(tmp_path, content.rsplit(None, 24)[0], "scan.grd"), size=None, lateral_unit=UM)
+
+
+def test_a_size_has_the_proportions_of_the_coordinates(tmp_path):
+    path = written(tmp_path, text(points()[: 20 * GRID]), "scan.xyz")
+    with refused("size", "the proportions 12 : 10 of the coordinates"):
+        read(path)
+    assert "pixels of 1 um x 1 um" in read(path, size=(24 * UM, 20 * UM), boundary="mirror").reading
 
 
 def test_zygo_integers_are_refused(tmp_path):

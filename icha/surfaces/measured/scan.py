@@ -42,6 +42,8 @@ _LIBRARIES = {
     "hdf5": "h5py",
     "instrument": "SurfaceTopography",
 }
+# Largest relative difference of the proportions of a scan by its size and by its coordinates.
+_PROPORTIONS = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +96,14 @@ def load_scan(path: Path, settings: Preparation) -> Scan:
                 "or the `size` of the scan",
             )
         size = tuple(each * settings.lateral_unit for each in found.coordinates)
+    elif found.coordinates is not None and not np.isclose(
+        size[0] * found.coordinates[1], size[1] * found.coordinates[0], rtol=_PROPORTIONS, atol=0
+    ):
+        raise UnfitTopography(
+            "size",
+            "does not have the proportions {:.4g} : {:.4g} of the coordinates; expected two lengths along x and y, or "
+            "the key `lateral_unit` instead".format(*found.coordinates),
+        )
     if size is None:
         raise UnfitTopography(
             "size", "is missing, and the file does not contain the size of the scan; expected a length such as '90 um'"

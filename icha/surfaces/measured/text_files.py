@@ -53,7 +53,7 @@ _GWYDDION = {
 _LABELS = {label: re.compile(rf"#?\s*({words})\s*[:：]\s*(.*)", re.IGNORECASE) for label, words in _GWYDDION.items()}
 # Words in the headings of texts that SurfaceTopography reads: Wyko, SPIP, Attocube, Nova, and interferometers.
 _INSTRUMENT = re.compile(
-    r"Wyko ASCII|File Format\s*=\s*ASCII|x-pixels|x-length|^\s*Scale X\s*=|height\s+conversion\s+factor",
+    r"Wyko ASCII|File Format\s*=\s*ASCII|x-unit|^\s*Scale X\s*=|height\s+conversion\s+factor",
     re.IGNORECASE | re.MULTILINE,
 )
 _NUMBER = r"([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)"
@@ -130,12 +130,18 @@ def read_matrix(file: SourceFile, settings: Preparation) -> FileContent:
         return known
     if not (_counts_agree(lines, heights.shape) or _is_image(lines)):
         refuse_coordinates(heights)
+        if file.ends_with_delimiters and len(heights) != len(heights.T):
+            raise UnfitTopography(
+                "path",
+                "has a delimiter at the end of every line; the last column may be missing heights, or no column. "
+                "Remove these delimiters, or write nan for missing heights",
+            )
     heading = _read_heading(file.table_layout, heights.shape, settings)
     heights = _mark_missing(heights, heading)
-    size, coordinates, remark = heading.size, heading.coordinates, file.remark
+    size, coordinates = heading.size, heading.coordinates
     if settings.first_axis == "x":
         size, coordinates = size and size[::-1], coordinates and coordinates[::-1]
-    return FileContent(put_y_first(heights, settings), heading.height_unit, size, coordinates, remark=remark)
+    return FileContent(put_y_first(heights, settings), heading.height_unit, size, coordinates)
 
 
 def _as_instrument_file(file, settings):

@@ -101,29 +101,21 @@ class SourceFile:
         return self._table[0]
 
     @property
-    def remark(self) -> str:
-        """Remark on an empty last column that was left out."""
+    def ends_with_delimiters(self) -> bool:
+        """Whether every line ends with a delimiter; `values` does not contain an empty column after it."""
         return self._table[2]
 
     @cached_property
     def _table(self):
-        """Numbers in the file, array of shape (rows, columns), the line number (from 1) of each row, and a remark."""
+        """Numbers in the file, the line number (from 1) of each row, and whether all lines end with a delimiter."""
         layout, end = self.table_layout, self.table_layout.delimiter
-        values, numbers, ends, gaps = [], [], end != " ", False
+        values, numbers, ends = [], [], end != " "
         rows = self._rows()
         while batch := list(itertools.islice(rows, _BATCH)):
             values.append(_read_numbers(batch, layout))
             numbers.append(np.array([number for number, _ in batch]))
             ends = ends and all(text.endswith(end) for _, text in batch)
-            gaps = gaps or any(text.startswith(end) or end * 2 in text for _, text in batch)
-        if ends and gaps:
-            raise UnfitTopography(
-                "path",
-                f"has {end!r} at the end of every line, and empty fields; the last column may be missing heights, or "
-                "no column. Remove the delimiters at the ends, or write nan for missing heights",
-            )
-        remark = f"{end!r} at the end of every line left out" if ends else ""
-        return np.concatenate(values)[:, : layout.fields - ends], np.concatenate(numbers), remark
+        return np.concatenate(values)[:, : layout.fields - ends], np.concatenate(numbers), ends
 
     def _rows(self) -> Iterator[tuple[int, str]]:
         """Yield the line number and the text of each row; raise UnfitTopography if rows have different lengths."""
