@@ -30,6 +30,7 @@ _REMARK = re.compile(r"(?<!1\.)#(?!N/A|NA\b|VALUE!|NUM!|DIV/0!|NULL!|REF!)", re.
 # The exponent of a number in double precision, as Fortran writes it, such as 1.5D-3.
 _FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[-+]?\d)")
 _NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)(e[-+]?\d+)?|[-+]?inf(inity)?", re.IGNORECASE)
+_PLAIN = frozenset("0123456789+-.eE,; \t")
 # A number with three digits after a comma. The comma may be a decimal sign, or it may separate thousands.
 AMBIGUOUS_COMMA = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}(?!\d)")
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+([eE][-+]?\d+)?")
@@ -207,12 +208,13 @@ def _clean(line: str, delimiter: str = " ") -> str:
     Tabs remain at the ends, because they may separate fields.
     """
     text = (_REMARK.split(line, maxsplit=1)[0] if "#" in line else line).strip(" \r\n\x1a")
-    text = _FORTRAN.sub("e", _NAN.sub("nan", text.replace("−", "-")))
-    return (
-        re.sub(rf"[ \t]*{delimiter}[ \t]*" if delimiter in ",;" else " *\t *", delimiter, text)
-        if delimiter != " "
-        else text
-    )
+    text = text.replace("−", "-")
+    # Plain numbers need no regular expression; these would be slow in long lines.
+    if not _PLAIN.issuperset(text):
+        text = _FORTRAN.sub("e", _NAN.sub("nan", text))
+    if delimiter != " " and (" " in text or "\t" in text):
+        text = re.sub(rf"[ \t]*{delimiter}[ \t]*" if delimiter in ",;" else " *\t *", delimiter, text)
+    return text
 
 
 def strip_remark(line: str) -> str:
@@ -247,10 +249,11 @@ def _read_numbers(rows, layout):
     import pandas as pd  # slow to import
 
     try:
+        table = "\n".join(text for _, text in rows)
         # pandas would read the word "true" as 1.
-        if not any(re.search("true|false", text, re.IGNORECASE) for _, text in rows):
+        if not ("true" in table.lower() or "false" in table.lower()):
             return pd.read_csv(
-                io.BytesIO("\n".join(text for _, text in rows).encode()),
+                io.BytesIO(table.encode()),
                 sep=r"\s+" if layout.delimiter == " " else layout.delimiter,
                 decimal=layout.decimal,
                 quotechar='"',
