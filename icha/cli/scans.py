@@ -230,7 +230,8 @@ def _load(path: Path, data: str | None):
     from icha.surfaces.measured.scan import load_scan
     from icha.surfaces.measured.settings import Preparation, UnfitTopography
 
-    guessed, missing = {}, {}
+    guessed: dict[str, Any] = {}
+    missing: dict[str, str] = {}
     while True:
         try:
             scan = load_scan(path, Preparation("auto", "free", data, **guessed))

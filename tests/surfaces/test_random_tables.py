@@ -11,7 +11,7 @@ from icha.surfaces.measured.settings import UnfitTopography
 DELIMITERS, ENCODINGS = (",", ";", "\t", " "), ("utf-8", "utf-8-sig", "utf-16", "cp1252")
 WORDS = ("", "nan", "NaN", "BAD", "none", "-", "***", "#N/A", "1.#QNAN", "no data")
 # Headings that state nothing of use, or what is not enough for the size of a scan.
-USELESS = ("Samples: 4", "Operator: N. N.", "Width: 20 um", "Gain: 3", "Date: 2026-01-01", "Pixel: 512", "Height: 9 nm")
+USELESS = ("Samples: 4", "Operator: N. N.", "Width: 20 um", "Gain: 3", "Date: 2026-01-01", "Pixel: 512", "Rate: 1 Hz")
 
 
 def heights_of(random, rows, columns):
@@ -183,10 +183,11 @@ def test_tables_give_the_right_heights_and_cells_or_a_question(tmp_path, part):
             if table.broken:
                 assert "line " in str(error), seed
             if not (table.axis or table.broken or not table.stated):
-                asked.append((seed, str(error)))
+                # Ambiguous commas, and delimiters at the ends of lines, are the only reasons for questions.
+                assert table.comma or table.ending, f"table {seed}: {error}"
+                asked.append(seed)
             continue
         assert not table.axis and not table.broken and table.stated, f"table {seed}: {table.text[:300]}"
         np.testing.assert_allclose(found.heights, table.heights * NM, rtol=1e-6, err_msg=f"table {seed}")
         np.testing.assert_allclose(found.pixel, np.multiply(table.cell, UM), rtol=1e-5, err_msg=f"table {seed}")
-    # Ambiguous commas, and delimiters at the ends of rows with empty fields, are asked about.
-    assert len(asked) <= 15, asked
+    assert len(asked) <= 8

@@ -276,10 +276,12 @@ def test_a_size_that_a_heading_does_not_state_clearly_is_asked_for(tmp_path, hea
 
 
 def test_two_units_of_the_heights_are_asked_about(tmp_path):
-    path = written(tmp_path, text(rows(), " ", ["Z unit: nm", "Height unit: um"]), "scan.txt")
-    with refused("height_unit", "the file states nm and um"):
-        read(path, height_unit=None)
-    assert_heights(read(path))
+    # Gwyddion writes the same Korean words for the unit of coordinates and that of heights.
+    for heading in (["Z unit: nm", "Height unit: um"], ["# 채널: Z", "# 값 단위: nm", "# 값 단위: um"]):
+        path = written(tmp_path, text(rows(), " ", heading), "scan.txt")
+        with refused("height_unit", "the file states nm and um"):
+            read(path, height_unit=None)
+        assert_heights(read(path))
 
 
 # Width, height, value units and lateral units as Gwyddion translates them.

@@ -11,7 +11,7 @@ import scipy.fft
 from icha.support import formatting
 from icha.support.input_files import require_room
 from icha.support.rules import GRID
-from icha.surfaces.measured.array_files import is_instrument_text, read_instrument
+from icha.surfaces.measured.array_files import is_instrument_text
 from icha.surfaces.measured.settings import (
     LINE_SCAN,
     FileContent,
@@ -34,8 +34,6 @@ _QUANTITIES = re.compile(r"load|force|radius|area|pressure|displacement|indentat
 _FEW_DIGITS = 1e-6
 # A size in a heading of no known format counts only if the pixels are square up to this relative difference.
 _SQUARE = 1e-2
-# Surfer writes this number for a missing height.
-_SURFER_MISSING = 1.70141e38
 # Bytes per node for the spectrum, the conjugate spectrum, their difference, the heights and the masks of waves.
 _BYTES_OF_NODE = 64
 # Opposite waves count as conjugate if the error, divided by the largest amplitude, is at most this value.
@@ -51,9 +49,10 @@ _GWYDDION = {
     "|Единицы горизонтальных размеров",
 }
 _LABELS = {label: re.compile(rf"#?\s*({words})\s*[:：]\s*(.*)", re.IGNORECASE) for label, words in _GWYDDION.items()}
-# Words in the headings of texts that SurfaceTopography reads: Wyko, SPIP, Attocube, Nova, and interferometers.
+# Words in the headings of texts that SurfaceTopography reads: Wyko, SPIP, Attocube, Nova, interferometers, line scans.
 _INSTRUMENT = re.compile(
-    r"Wyko ASCII|File Format\s*=\s*ASCII|x-unit|^\s*Scale X\s*=|height\s+conversion\s+factor",
+    r"Wyko ASCII|File Format\s*=\s*ASCII|x-unit|^\s*Scale X\s*=|height\s+conversion\s+factor"
+    r"|\AX;Y;valid|\AScan Parameters",
     re.IGNORECASE | re.MULTILINE,
 )
 _NUMBER = r"([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)"
@@ -63,16 +62,8 @@ _LENGTHS = re.compile(rf"{_NUMBER}\s*(\S+?)?(?:\s*[x×*]\s*{_NUMBER}\s*(\S+)?)?$
 _ENTRY = re.compile(r"^[#%/\s']*([A-Za-z][A-Za-z _./()-]*?)\s*(?:[:=,;\t]\s*|\s+(?=[-+]?\d))(.+?)[\s',;]*$")
 # Names of entries in a heading, in small letters and without punctuation; the last ones are Keyence's.
 _SIZES = ("size", "scan size", "scan range", "scan area", "field of view")
-_PIXELS = (
-    "pixel",
-    "pixel size",
-    "pixel spacing",
-    "point spacing",
-    "spacing",
-    "cell size",
-    "cellsize",
-    "xy calibration",
-    "xy justierung",
+_PIXELS = "pixel|pixel size|pixel spacing|point spacing|spacing|cell size|cellsize|xy calibration|xy justierung".split(
+    "|"
 )
 _HEIGHT_UNITS = ("z unit", "z units", "value unit", "value units", "height unit", "height units", "data unit")
 _UNITS = ("unit", "units", "einheit")
@@ -81,8 +72,8 @@ _COUNTS = {
     "columns": ("ncols", "cols", "columns", "number of columns", "horizontal", "horizont"),
 }
 _MISSING = ("nodata value", "nodata", "no data value", "missing value", "bad value", "missing data value")
-# Number for a missing height in ESRI grids, if the heading does not define another number.
-_ESRI_MISSING = "-9999"
+# Numbers for a missing height in grids by ESRI, if the heading does not define another number, and by Surfer.
+_ESRI_MISSING, _SURFER_MISSING = -9999.0, "1.70141e+38"
 
 
 @dataclass(frozen=True)
@@ -112,10 +103,10 @@ def format_of_text(file: SourceFile) -> str:
     if _titles(layout):
         return "xyz"
     _refuse_measurements(layout)
-    # Headings from instruments contain lines that are not remarks; the first lines here are those of line scans.
-    if layout.heading[:1] and layout.heading[0].startswith(("X;Y;valid", "Scan Parameters")):
-        return "instrument"
-    if any(map(strip_remark, layout.heading)) and is_instrument_text(file):
+    # Headings from instruments contain lines that are not remarks.
+    if _INSTRUMENT.search("\n".join(layout.heading)) or (
+        any(map(strip_remark, layout.heading)) and is_instrument_text(file)
+    ):
         return "instrument"
     return "xyz" if 3 <= layout.columns < _FEWEST_COLUMNS and not _is_image(layout.heading) else "matrix"
 
@@ -126,8 +117,6 @@ def read_matrix(file: SourceFile, settings: Preparation) -> FileContent:
     if lines and lines[0].startswith("Zygo "):
         raise UnfitTopography("path", "is a Zygo file without points x y z; expected another export, such as XYZ")
     file.refuse_blocks()
-    if _INSTRUMENT.search("\n".join(lines)) and (known := _as_instrument_file(file, settings)):
-        return known
     if not (_counts_agree(lines, heights.shape) or _is_image(lines)):
         refuse_coordinates(heights)
         if file.ends_with_delimiters and len(heights) != len(heights.T):
@@ -142,19 +131,6 @@ def read_matrix(file: SourceFile, settings: Preparation) -> FileContent:
     if settings.first_axis == "x":
         size, coordinates = size and size[::-1], coordinates and coordinates[::-1]
     return FileContent(put_y_first(heights, settings), heading.height_unit, size, coordinates)
-
-
-def _as_instrument_file(file, settings):
-    """Read a text with SurfaceTopography; None if no unit is found, or if the heights disagree with `file.values`."""
-    try:
-        found = read_instrument(file, settings)
-    except Exception:  # SurfaceTopography raises many types of errors for texts of other formats
-        return None
-    if found.unit is None or found.heights.shape != file.values.shape or np.isnan(file.values).any():
-        return None
-    largest = np.max(np.abs(found.heights))
-    scale = largest / np.max(np.abs(file.values))
-    return found if np.allclose(found.heights, scale * file.values, rtol=1e-9, atol=1e-9 * largest) else None
 
 
 def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
@@ -190,7 +166,7 @@ def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
             f"{nx * ny - len(points)} points, so the edge of the scan is not known. Remove the lines, or add x and y",
         )
     require_room(2 * 8 * nx * ny)
-    heading = _read_zygo(layout.heading) or _read_heading(layout, points.shape, settings)
+    heading = _read_heading(layout, points.shape, settings)
     heights = np.full(nx * ny, np.nan)
     heights[node] = _mark_missing(points[:, 2], heading)
     x_unit, y_unit, z_unit = (metres_of(titles[column - 1][1]) if titles else None for column in columns)
@@ -282,24 +258,6 @@ def _mark_missing(heights, heading):
     return heights
 
 
-def _read_zygo(lines: Sequence[str]) -> _Heading | None:
-    """Read the heading of a Zygo text of points (column, row, height in um); None for other files.
-
-    Line 8 of the heading contains the size of a pixel in m (0 if it is not known).
-    """
-    if not (lines and lines[0].startswith("Zygo ")):
-        return None
-    return _Heading(1e-6, float(lines[7].split()[6]) or None)
-
-
-def _read_surfer(lines, shape):
-    """Read the heading of a Surfer grid (DSAA): numbers of columns and rows, and ranges of x and y."""
-    (columns, rows), *ranges = ([float(number) for number in line.split()[:2]] for line in lines[1:4])
-    _require_counts({"columns": (int(columns), lines[1]), "rows": (int(rows), lines[1])}, shape)
-    sides = [abs(high - low) * count / (count - 1) for (low, high), count in zip(ranges, (columns, rows), strict=True)]
-    return _Heading(coordinates=tuple(sides), missing=(_SURFER_MISSING,))
-
-
 def _read_heading(layout: Layout, shape: tuple[int, int], settings: Preparation) -> _Heading:
     """Read units, size and missing heights from the heading of a table with the given shape (rows, columns).
 
@@ -307,25 +265,23 @@ def _read_heading(layout: Layout, shape: tuple[int, int], settings: Preparation)
     settings do not contain the value.
     """
     lines = layout.heading
-    if lines and lines[0].strip() == "DSAA":
-        return _read_surfer(lines, shape)
     entries = _entries(lines)
 
     def values(names):
-        return [entries[name][0] for name in names if name in entries]
+        return [value for name in names for value, _ in entries.get(name, [])]
 
     rows, columns = shape
-    esri = {"ncols", "nrows"} <= entries.keys()
-    if esri:
-        entries.setdefault(_MISSING[0], (_ESRI_MISSING, ""))
+    grid = {"ncols", "nrows"} <= entries.keys()
     heading = _Heading(
         height_unit=_agreed("height_unit", values(_HEIGHT_UNITS) or values(_UNITS), settings.height_unit),
-        lateral_unit=next(map(metres_of, values(["lateral units"])), None),
-        missing=tuple(_number(found[1]) for found in map(_LENGTHS.match, values(_MISSING)) if found),
+        lateral_unit=_agreed("lateral_unit", values(["lateral units"]), settings.lateral_unit)
+        or next((x for text in values(["distance of points"]) for x, _ in _lengths(text)), None),
+        missing=tuple(_number(found[1]) for found in map(_LENGTHS.match, values(_MISSING)) if found)
+        or ((_ESRI_MISSING,) if grid else ()),
     )
     texts = [(text, (1, 1)) for text in values(_SIZES)] + [(text, (columns, rows)) for text in values(_PIXELS)]
     found = [(text, x * nx, y * ny) for text, (nx, ny) in texts for x, y in _lengths(text)]
-    if not found and esri and (steps := re.fullmatch(rf"{_NUMBER}(?: x {_NUMBER})?", texts[0][0] if texts else "")):
+    if not found and grid and (steps := re.fullmatch(rf"{_NUMBER}(?: x {_NUMBER})?", texts[0][0] if texts else "")):
         x, y = _number(steps[1]), _number(steps[2] or steps[1])
         return replace(heading, coordinates=(x * columns, y * rows))
     pixels = [(x / columns, y / rows) for _, x, y in found]
@@ -333,7 +289,7 @@ def _read_heading(layout: Layout, shape: tuple[int, int], settings: Preparation)
     problem = ""
     if layout.decimal != "," and any(AMBIGUOUS_COMMA.match(text) for text, _, _ in found):
         problem = f"is {stated!r} in the file; the comma may be decimal or separate thousands"
-    elif not (esri or _is_image(lines) or np.allclose(pixels, pixels[0][0] if pixels else 0, rtol=_SQUARE, atol=0)):
+    elif not (grid or _is_image(lines) or np.allclose(pixels, pixels[0][0] if pixels else 0, rtol=_SQUARE, atol=0)):
         problem = f"is missing, and the lengths in the heading, {stated}, do not fit {columns} x {rows} square pixels"
     if problem and settings.size is None:
         raise UnfitTopography("size", f"{problem}. Give the size in this key")
@@ -356,47 +312,56 @@ def _is_image(lines: Sequence[str]) -> bool:
 
 def _counts_agree(lines: Sequence[str], shape: tuple[int, int]) -> bool:
     """Return whether the heading states the rows and columns of a table; raise UnfitTopography if it states others."""
-    entries = _entries(lines)
-    counts: dict[str, tuple[int, str]] = {}
-    for axis, names in _COUNTS.items():
-        for name in names:
-            if name in entries and entries[name][0].isdecimal():
-                counts.setdefault(axis, (int(entries[name][0]), entries[name][1]))
-    _require_counts(counts, shape)
-    return len(counts) == 2
-
-
-def _require_counts(counts, shape):
-    """Raise UnfitTopography unless a table has the `counts` of rows and columns, which stand in the given lines."""
-    for axis, count in zip(("rows", "columns"), shape, strict=True):
-        stated, line = counts.get(axis, (count, ""))
-        if stated != count:
-            raise UnfitTopography(
-                "path",
-                f"has {count} {axis} of numbers, but its heading states {stated} in {line.strip()[:40]!r}; expected a "
-                "whole table. Export the table again, or correct or remove this line",
-            )
+    entries, agreed = _entries(lines), set()
+    for (axis, names), count in zip(_COUNTS.items(), shape, strict=True):
+        for value, line in (entry for name in names for entry in entries.get(name, []) if entry[0].isdecimal()):
+            if int(value) != count:
+                raise UnfitTopography(
+                    "path",
+                    f"has {count} {axis} of numbers, but its heading states {value} in {line.strip()[:40]!r}; expected "
+                    "a whole table. Export the table again, or correct or remove this line",
+                )
+            agreed.add(axis)
+    return len(agreed) == 2
 
 
 def _entries(lines):
-    """Return the values, and the lines, of the names (in small letters) that a heading contains."""
-    entries, previous = {}, ""
+    """Return lists of the values, with their lines, that a heading contains, by names in small letters.
+
+    Headings of Surfer (numbers of columns and rows, then ranges of x and y) and Zygo (size of a pixel in line 8, in m;
+    heights in um) are translated into entries.
+    """
+    entries: dict[str, list[tuple[str, str]]] = {}
+
+    def add(name, value, line):
+        entries.setdefault(name, []).append((value.strip(), line))
+
+    first, previous = lines[0].strip() if lines else "", ("", "")
+    if first == "DSAA":
+        counts, *ranges = ([float(number) for number in line.split()[:2]] for line in lines[1:4])
+        steps = [abs(high - low) / (count - 1) for (low, high), count in zip(ranges, counts, strict=True)]
+        values = (f"{counts[0]:.0f}", f"{counts[1]:.0f}", "{} x {}".format(*steps), _SURFER_MISSING)
+        for name, value in zip(("ncols", "nrows", "cellsize", _MISSING[0]), values, strict=True):
+            add(name, value, lines[1])
+        return entries
+    if first.startswith("Zygo "):
+        add("value units", "um", first)
+        add("distance of points", f"{lines[7].split()[6]} m", lines[7])
+        return entries
     for line in lines:
-        label = next(((label, match[2]) for label, regex in _LABELS.items() if (match := regex.match(line))), ("", ""))
-        if label[0]:
-            name, value = label
-        elif found := _ENTRY.match(line.replace('"', "")):
-            name = re.sub(r"[\s_.-]+", " ", found[1].lower()).strip()
-            # A delimiter may stand between a number and its unit.
-            value = re.sub(r"(?<=\d)\s*[,;\t]\s*(?=[^\W\d])", " ", found[2])
-        else:
+        label = next(((label, match[2]) for label, regex in _LABELS.items() if (match := regex.match(line))), None)
+        if not (label or (found := _ENTRY.match(line.replace('"', "")))):
             continue
+        # A delimiter may stand between a number and its unit.
+        name, value = label or (
+            re.sub(r"[\s_.-]+", " ", found[1].lower()).strip(),
+            re.sub(r"(?<=\d)\s*[,;\t]\s*(?=[^\W\d])", " ", found[2]),
+        )
+        add(name, value, line)
         # The height of an image follows its width; elsewhere it may be a height of the surface.
-        for first, second, both in (("width", "height", "size"), ("dx", "dy", "pixel")):
-            if (previous, name) == (first, second):
-                entries.setdefault(both, (f"{entries[first][0]} x {value.strip()}", line))
-        entries.setdefault(name, (value.strip(), line))
-        previous = name
+        if (previous[0], name) in (("width", "height"), ("dx", "dy")):
+            add("size" if name == "height" else "pixel", f"{previous[1]} x {value.strip()}", line)
+        previous = name, value.strip()
     return entries
 
 

@@ -291,20 +291,19 @@ def _find_layout(lines: list[str]) -> Layout | None:
     Raises UnfitTopography if commas may be decimal or delimiters, or if the line above the numbers is a damaged row.
     """
     start, stated = _known_beginning(lines)
-    damage = None
+    damages = []
     for number, line in enumerate(lines[start:], start):
-        text = _clean(line)
-        if not text.strip():
-            continue
-        if delimiter := _find_delimiter(text):
-            break
-        damage = _find_damage(text, number + 1)
+        if (text := _clean(line)).strip():
+            if delimiter := _find_delimiter(text):
+                break
+            damages.append(_find_damage(text, number + 1))
     else:
-        if damage := first_damaged_line(lines):
+        if damage := next(filter(None, damages), None):
             raise damage
         return None
-    if damage and number and _find_damage(_clean(lines[number - 1]), number):
-        raise damage
+    # The line above the numbers.
+    if damages and damages[-1]:
+        raise damages[-1]
     texts = [text for line in lines[number:] if (text := _clean(line, delimiter)).strip()]
     counts = Counter(_count_fields(text, delimiter) for text in texts)
     fields = max(counts, key=counts.__getitem__)
@@ -370,11 +369,6 @@ def _find_damage(text, number):
     if not wrong or len(fields) < _FEWEST_FIELDS or 2 * len(words) > len(fields):
         return None
     return _not_a_number(fields[wrong[0]], wrong[0], number)
-
-
-def first_damaged_line(lines: list[str]) -> UnfitTopography | None:
-    """Return the error for the first damaged row, where most but not all fields are numbers; None if there is none."""
-    return next(filter(None, (_find_damage(_clean(line), number) for number, line in enumerate(lines, 1))), None)
 
 
 def _find_decimal_sign(rows, delimiter):
