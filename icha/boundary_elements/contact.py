@@ -232,7 +232,8 @@ class BoundaryElements(FullContactProblem):
         """
         if not self.adhesive:
             return self._solve_nonadhesive(state, separation=separation / self.spacing)
-        problem = FrontProblem(self.space, self.front, self.topography, separation / self.spacing)
+        height = self.rms_height / self.spacing
+        problem = FrontProblem(self.space, self.front, self.topography, separation / self.spacing, rms_height=height)
         start = self._predict(state, separation)
         solved, pending = solve_adhesive_contact(problem, self.summits, start, residual, nearby=nearby)
         front_residual = find_active_cells(self.front, solved).residual

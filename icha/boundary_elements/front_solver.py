@@ -35,7 +35,7 @@ class FrontTolerances:
     """Tolerances of the solver; `docs/short_range.md` justifies them by measurements.
 
     The residual of a cell is |intensity - 1|, see `ActiveCells`. In contact, the intensity is K/K_c = sqrt(G/W); W is
-    the local work of adhesion. Errors of displacements are divided by the critical opening.
+    the local work of adhesion. Errors of displacements are divided by the `displacement_unit` of the `FrontProblem`.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class FrontTolerances:
 
 
 TOLERANCES = FrontTolerances()
-# Smallest error to which displacements are solved, in units of the critical opening.
+# Smallest error to which displacements are solved, in units of `FrontProblem.displacement_unit`.
 _SMALLEST_ERROR = 1e-3 * TOLERANCES.front
 # Largest numbers of iterations, of Krylov vectors, of local relaxations between steps; largest damping.
 _MAX_ITERATIONS, _MAX_KRYLOV, _MAX_LOCAL_RELAXATIONS, _LARGEST_DAMPING = 400, 60, 5, 1e8
@@ -159,6 +159,7 @@ class FrontProblem:
     space, front, topography : half-space, law of the front, heights of the surface.
     separation : mean separation, in cell sizes.
     background : in windows, part of the mean fraction due to contact outside the window; otherwise None.
+    rms_height : rms height of the surface, in cell sizes; infinite in windows, whose results are solved again.
     """
 
     space: HalfSpace
@@ -166,11 +167,21 @@ class FrontProblem:
     topography: Topography
     separation: float
     background: np.ndarray | None = None
+    rms_height: float = math.inf
 
     def solve_elastic(self, contact: Contact, accuracy: float) -> AdhesiveContact:
-        """Call `solve_bonded_contact`; displacement errors are at most `accuracy` times the critical opening."""
+        """Call `solve_bonded_contact`; displacement errors are at most `accuracy` times the `displacement_unit`."""
         tolerance = self._tolerance(accuracy, contact)
         return solve_bonded_contact(self.space, self.topography, self.separation, contact, tolerance, self.background)
+
+    @property
+    def displacement_unit(self) -> float:
+        """Unit of displacement errors, in cell sizes: the critical opening, or half the rms height if that is smaller.
+
+        The residual of a run is an error of the gap over the rms height. With strong adhesion on a shallow surface, the
+        critical opening exceeds the rms height, and errors in units of the critical opening would be too large.
+        """
+        return min(self.front.critical_opening, 0.5 * self.rms_height)
 
     def _tolerance(self, accuracy, contact):
         """Return the largest allowed error of displacements, in cell sizes; it is smaller if only few cells are open.
@@ -178,10 +189,10 @@ class FrontProblem:
         Near full contact, a small error of the displacements causes a large error of the mean pressure.
         """
         open_part = 1 - float(np.sum(contact.fraction)) / self.space.size
-        return accuracy * self.front.critical_opening * float(np.clip(open_part / TOLERANCES.few, 1e-3, 1.0))
+        return accuracy * self.displacement_unit * float(np.clip(open_part / TOLERANCES.few, 1e-3, 1.0))
 
     def is_accurate(self, state: AdhesiveContact, accuracy: float) -> bool:
-        """Return whether a state was solved to displacement errors of `accuracy` times the critical opening."""
+        """Return whether a state was solved to displacement errors of `accuracy` times the `displacement_unit`."""
         return state.tolerance <= (1 + _WORK_ROUNDING) * self._tolerance(accuracy, state)
 
     def energy(self, state: AdhesiveContact) -> float:
@@ -241,7 +252,10 @@ def relax_front(
                 raise NotConverged(f"{failure} (residual of sqrt(G/dgamma): {active.residual:.1e})") from None
             if not relaxation.refine(_SMALLEST_ERROR):
                 return relaxation.state
-    if max_iterations or active.residual <= TOLERANCES.stagnation:
+    if max_iterations:
+        return relaxation.state
+    if active.residual <= TOLERANCES.stagnation:
+        relaxation.refine(TOLERANCES.displacement * tolerance)
         return relaxation.state
     raise NotConverged(f"the front did not converge (residual of sqrt(G/dgamma): {active.residual:.1e})")
 
@@ -257,7 +271,7 @@ class FrontRelaxation:
     ----------
     state : contact after the last step.
     damping : damping of the bonds in the next step.
-    start, coarsest : largest allowed error of displacements in critical openings: in the first solution, and in the
+    start, coarsest : largest allowed error of displacements in their unit: in the first solution, and in the
         next step. After a failed step `coarsest` is at most TOLERANCES.certain_displacement.
     local_relaxations : number of local relaxations since the last successful step; the allowed maximum after a failure.
     steps : number of steps of the whole front that were tried.
@@ -273,7 +287,7 @@ class FrontRelaxation:
         self.state = contact
 
     def refine(self, accuracy: float) -> bool:
-        """Solve the pressures again, and return True, if displacement errors exceed `accuracy` critical openings."""
+        """Solve the pressures again, and return True, if displacement errors exceed `accuracy` units."""
         accuracy = max(accuracy, _SMALLEST_ERROR)
         if self.problem.is_accurate(self.state, accuracy):
             return False
@@ -304,7 +318,7 @@ class FrontRelaxation:
         return True
 
     def _moving_accuracy(self, active: ActiveCells) -> float:
-        """Return the allowed displacement error after the next step, in critical openings; see `FrontTolerances`."""
+        """Return the allowed displacement error after the next step, in its unit; see `FrontTolerances`."""
         residual = active.residual
         return residual * min(TOLERANCES.moving_displacement, max(residual, TOLERANCES.linear[0]))
 

@@ -8,7 +8,7 @@ from icha.boundary_elements.adhesive import solve_adhesive_contact
 from icha.boundary_elements.contact import contact_of
 from icha.boundary_elements.elastic_contact import Contact
 from icha.boundary_elements.front_solver import TOLERANCES, FrontProblem
-from icha.checks.run import check_run
+from icha.checks.run import RESIDUAL_LIMIT, check_run
 from icha.contact.model import PRESSURE, Control
 from validation.closed_forms import Sinusoid
 from validation.random_loops import follow_loop, random_loop
@@ -144,3 +144,14 @@ def test_few_cells_that_open_in_full_contact_reach_the_minimum_of_the_energy(gap
 def test_random_loops_end(number):
     """All of them are run by `python -m validation.random_loops`."""
     assert follow_loop(random_loop(number, grid=48)) == ""
+
+
+def test_the_residual_is_small_where_the_critical_opening_exceeds_the_rms_height():
+    """A sticky Gaussian pit: errors of displacements are relative to the smaller of both heights."""
+    x = (np.arange(32) - 16) / 32
+    heights = -1e-6 * np.exp(-(x[:, None] ** 2 + x**2) / 2 / 0.08**2)
+    surface, material = icha.Surface(heights, 100e-6), icha.Material(1e6, 0.8, 1e-8)
+    contact = contact_of(surface, material)
+    assert contact.front.critical_opening * contact.spacing > 5 * surface.rms_height
+    run = icha.simulate(surface, material, icha.Path(area_fractions=[0.1]), model="boundary_elements")
+    assert "failed_checks" not in run.attrs and float(run["residual"].max()) < RESIDUAL_LIMIT
