@@ -132,7 +132,8 @@ def simulate(
     Warns
     -----
     IchaWarning
-        If an argument is unusual, mostly because of a wrong unit. If the model is not applicable, or the run fails
+        If an argument is unusual, mostly because of a wrong unit. If unloading does not have the state of a snapshot.
+        If the model is not applicable, or the run fails
         checks: the numbers of this run must not be used.
 
     Raises
@@ -157,6 +158,11 @@ def simulate(
     for text in (*_unusual_arguments(surface, material), *doubts(surface, material, path, model)):
         warnings.warn(text, IchaWarning, stacklevel=2)
     dataset = _compute(solver, surface, material, path, model, seed, progress, kept)
+    saved = list(zip(dataset["snapshot_kind"].values, dataset["snapshot_target"].values, strict=True))
+    for target in path.unloading_snapshots:
+        if (target.snapshot_kind, target.value) not in saved:
+            text = f"{target.describe()}: no snapshot, because unloading does not reach this state, or jumps over it"
+            warnings.warn(text, IchaWarning, stacklevel=2)
     if dataset.attrs["applicability"]:
         warnings.warn(dataset.attrs["applicability"], IchaWarning, stacklevel=2)
     for name, reasons in attributes_of_failure(check_run(dataset)).items():
@@ -313,7 +319,7 @@ def _check_arguments(surface, material, path, by_summits):
             raise ValueError(f"{name}: expected an icha.{kind.__name__}, got a {type(value).__name__}")
     # Loading may end early at the limit of the asperity model, but the first target must be within the limit.
     limited = (path.targets[0], *path.turning_points) if by_summits else ()
-    for target in (*path.targets, *path.turning_points):
+    for target in (*path.targets, *path.turning_points, *path.unloading_snapshots):
         if target in limited and target.kind in ASPERITY_RANGES and target.value > 0:
             ASPERITY_RANGES[target.kind].validate(f"path: {target.kind}", target.value)
         _check_target(surface, material, target, by_summits)
@@ -323,7 +329,7 @@ def _check_arguments(surface, material, path, by_summits):
 
 def _check_target(surface, material, target, by_summits):
     """Raise `ValueError` for a load that is too small or too large, a large radius, or a snapshot far above contact."""
-    place = f"path: {target.kind} = {target.value!r} {UNITS.get(target.kind, '')}".rstrip()
+    place = f"path: {target.snapshot_kind} = {target.value!r} {UNITS.get(target.kind, '')}".rstrip()
     modulus = material.contact_modulus
     units = {RELATIVE_LOAD: 1.0, NOMINAL_PRESSURE: modulus, FORCE: modulus * surface.period**2}
     if target.kind in units:
@@ -396,7 +402,7 @@ def _record_path(contact, observables, path, reachable, progress) -> _PathRecord
 
     def record_snapshot(target, state, step):
         """Add a snapshot of a state to the record; `step` is the index of the step of this state."""
-        row = {"snapshot_step": step, "snapshot_kind": target.kind, "snapshot_target": target.value}
+        row = {"snapshot_step": step, "snapshot_kind": target.snapshot_kind, "snapshot_target": target.value}
         record.snapshots.append(_require_finite(row | observables.of_snapshot(state)))
 
     try:
@@ -502,7 +508,8 @@ def _indenter_values(surface: Surface, material: Material, steps: Sequence[dict]
 def _describe_targets(table: Table, path: Path) -> Table:
     """Return the descriptions of `step_target` and `snapshot_target`; the units depend on the targets of the path."""
     steps = {target.kind for target in (*path.targets, *path.turning_points)} | ({BETWEEN} if path.cyclic else set())
-    snapshots = {target.kind for target in path.targets if target.snapshot} | ({PULL_OFF} if path.unload else set())
+    snapshots = {target.snapshot_kind for target in (*path.targets, *path.unloading_snapshots) if target.snapshot}
+    snapshots |= {PULL_OFF} if path.unload else set()
     return {
         "step_target": table["step_target"]._replace(**_target_unit(steps, "step_kind")),
         "snapshot_target": table["snapshot_target"]._replace(**_target_unit(snapshots, "snapshot_kind")),

@@ -255,6 +255,34 @@ def test_arguments_with_a_wrong_unit_give_a_warning():
         simulate(lens, BARE, Path(contact_radii=[2e-4]), model="boundary_elements")
 
 
+@pytest.mark.parametrize("model", ["asperities", "boundary_elements"])
+def test_snapshots_at_states_of_the_last_unloading(model):
+    surface = SelfAffineSpectrum(PERIOD, 0.4 * PERIOD, 0.25 * PERIOD, 0.8, rms_slope=0.3).realise(32, 1)
+    material = Material(1e6, 2e-3)
+    states = [("reduced_pressure", 1e-3), ("area_fraction", 0.01), ("pressure", -5.0)]
+    saved = [("reduced_pressure", 1e-2), *((f"unloading_{kind}", value) for kind, value in states)]
+    path = Path([1e-3, 1e-2], unload=True, snapshots=[*saved, ("unloading_force", -1.0)])
+    with pytest.warns(IchaWarning, match="unloading_force = -1 N: no snapshot, because unloading does not reach"):
+        run = simulate(surface, material, path, model=model)
+    found = list(zip(run["snapshot_kind"].values, run["snapshot_target"].values, strict=True))
+    assert found[0] == saved[0] and sorted(found[1:-1]) == sorted(saved[1:]) and found[-1] == ("pull_off", 0)
+    at = run.isel(step=run["snapshot_step"].values.astype(int))
+    assert at["branch"].values.tolist() == ["loading"] + 4 * ["unloading"]
+    names = {
+        "reduced_pressure": "reduced_pressure",
+        "area_fraction": "contact_area_fraction",
+        "pressure": "nominal_pressure",
+    }
+    for kind, value in states:
+        k = found.index((f"unloading_{kind}", value))
+        assert float(at[names[kind]][k]) == pytest.approx(value, rel=1e-5)
+        pressures = run["pressure_density"][k] * np.diff(run["pressure_bin_edges"]) * run["pressure_bin_mean"][k]
+        assert float(pressures.sum()) == pytest.approx(float(at["nominal_pressure"][k]), rel=1e-3, abs=1e-3)
+    assert problems_with_file(RUN, run) == []
+    with pytest.raises(ValueError, match=r"snapshots\[0\]: 0.01 is a state of unloading; expected `unload: true`"):
+        Path([1e-2], snapshots=[("unloading_area_fraction", 0.01)])
+
+
 def test_a_model_that_is_not_applicable_gives_a_warning():
     with pytest.warns(IchaWarning, match="asperity model not applicable: full contact has a lower energy"):
         simulate(rough(slope=0.1), Material(1e6, 0.5), Path(mean_separations=[8 * rough(slope=0.1).rms_height]))

@@ -21,7 +21,7 @@ from icha.asperity.material import Material
 from icha.configuration.samples import Sample
 from icha.configuration.surfaces import SURFACE_KINDS, MaterialSection, MeasuredSurface
 from icha.contact.models import DEFAULT_MODEL, MODELS
-from icha.path.snapshots import AreaFraction, Indentation, ReducedPressure, Snapshot
+from icha.path.snapshots import AreaFraction, Indentation, PathState, ReducedPressure, Snapshot
 from icha.path.targets import (
     ASPERITY_RANGES,
     CONTACT_RADIUS,
@@ -38,6 +38,7 @@ from icha.path.targets import (
     REDUCED_PRESSURE,
     RELATIVE_LOAD,
     STEP,
+    UNLOADING,
     Path,
 )
 from icha.support.formatting import format_quantity, length
@@ -189,7 +190,7 @@ def _list_or_word(value: Any, read_list: Callable[[Any], Any]) -> Any:
     return value if value == EVERY_STOP else read_list(value)
 
 
-class TurningPoint(Snapshot):
+class TurningPoint(PathState):
     """A state at which the loading direction changes. Exactly one key must be given. Tensile loads are negative."""
 
 
@@ -410,7 +411,8 @@ class Study(Section):
                 limit = f"A/A0 = {MAX_AREA_FRACTION:g}, the limit of the asperity model" if by_summits else "the square"
                 reason = f"is too large on a square of side {length(side)}"
                 yield location, value, f"{reason}; expected at most {length(largest_radius, 4)} ({limit})"
-        if self.unload or self.turning_points or self.control != "separation":
+        saved = any(kind.startswith(UNLOADING) for kind, _ in snapshots or ())
+        if self.unload or self.turning_points or saved or self.control != "separation":
             yield from self._path_problems(snapshots)
 
     def states(self) -> Iterator[tuple[tuple, str, float]]:
@@ -421,6 +423,7 @@ class Study(Section):
         for key, states in (("snapshots", snapshots), ("turning_points", self.turning_points)):
             for k, state in enumerate(states):
                 kind, value = state.kind_and_value
+                kind = kind.removeprefix(UNLOADING)
                 yield (key, k, kind), kind, value
 
     def _path_problems(self, snapshots):
@@ -433,7 +436,7 @@ class Study(Section):
             location, value = (name,), getattr(self, name)
             if index:
                 kind, value = value[int(index.rstrip("]"))].kind_and_value
-                location = (name, int(index.rstrip("]")), kind)
+                location = (name, int(index.rstrip("]")), kind.removeprefix(UNLOADING))
             yield location, value, reason.removeprefix(f"{value!r} ")
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from icha.contact.models import MODELS, REFERENCE_MODEL, first_model
 from icha.datasets.labels import LABELS, RunLabels, place_of, surfaces_and_slopes
 from icha.figures.style import format_number
+from icha.path.targets import UNLOADING
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -222,7 +223,8 @@ def snapshot_label(run: xr.Dataset, snapshot: int) -> str:
     kind, value = str(run["snapshot_kind"].values[snapshot]), float(run["snapshot_target"].values[snapshot])
     if kind == "pull_off":
         return "pull-off"
-    return f"{_KIND_LABELS[kind]} = {format_number(value)}"
+    branch = "unloading, " if kind.startswith(UNLOADING) else ""
+    return f"{branch}{_KIND_LABELS[kind.removeprefix(UNLOADING)]} = {format_number(value)}"
 
 
 def select_errors(model_error: xr.DataTree | None, study: str) -> Iterator[tuple[tuple[str, str, float], xr.Dataset]]:

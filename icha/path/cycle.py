@@ -78,7 +78,9 @@ def follow_cycle(
         progress.report_position(f"turning point {turn.describe()}", cycle.state)
     if path.unload:
         leg = len(path.turning_points) + (len(path.turning_points) % 2 == 0)
-        targets = [TargetFunction(replace(target, snapshot=False), contact) for target in path.targets]
+        saved = {(target.kind, target.value): target for target in path.unloading_snapshots}
+        again = {(target.kind, target.value): replace(target, snapshot=False) for target in path.targets}
+        targets = [TargetFunction(target, contact) for target in (again | saved).values()]
         pending = [target for target in targets if target.excess(cycle.state) > target.tolerance]
         yield from cycle.follow_leg(leg, pending, until_apart=True)
         progress.report_position("apart", cycle.state)

@@ -1,8 +1,10 @@
 """Snapshots in a configuration: states of a path whose distributions are saved."""
 
+from typing import Literal
+
 from pydantic import Field, model_validator
 
-from icha.path.targets import QUANTITIES
+from icha.path.targets import QUANTITIES, UNLOADING
 from icha.support.rules import INDENTATIONS, NUMBER
 from icha.support.values import Force, Length, Pressure, Section, exactly_one, number, quantity
 
@@ -11,8 +13,8 @@ AreaFraction = number(QUANTITIES["area_fraction"].rule)
 Indentation = quantity(INDENTATIONS, "1 um")
 
 
-class Snapshot(Section):
-    """A state whose spots and distributions are saved. Exactly one key must be given. Tensile loads are negative."""
+class PathState(Section):
+    """A state of a path. Exactly one key must be given. Tensile loads are negative."""
 
     reduced_pressure: ReducedPressure | None = Field(  # type: ignore[valid-type]
         default=None, description="Reduced pressure p/(E* h'rms) of the state."
@@ -40,5 +42,21 @@ class Snapshot(Section):
     @property
     def kind_and_value(self) -> tuple[str, float]:
         """Key and value (SI units) that define the state."""
-        ((kind, value),) = self.model_dump(exclude_none=True).items()
+        ((kind, value),) = self.model_dump(exclude_none=True, exclude={"branch"}).items()
         return kind, value
+
+
+class Snapshot(PathState):
+    """A state whose spots and distributions are saved. One key besides `branch` must be given; tension is negative."""
+
+    branch: Literal["loading", "unloading"] = Field(
+        default="loading",
+        description="Branch of the state: `loading` is the first loading, `unloading` is the last unloading of a study "
+        "with `unload: true`.",
+    )
+
+    @property
+    def kind_and_value(self) -> tuple[str, float]:
+        """Kind and value of the state; the kind of a state on unloading begins with UNLOADING."""
+        kind, value = super().kind_and_value
+        return (kind if self.branch == "loading" else f"{UNLOADING}{kind}"), value

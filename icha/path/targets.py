@@ -123,8 +123,11 @@ ESTIMATED_AT_TARGETS |= {"contact_radius": AREAS, "stiffness": (), "force": LOAD
 ESTIMATED_OF_LOOPS += tuple(name for name in OF_SQUARES if name not in ESTIMATED_AT_TARGETS)
 # Kind of the target of an equilibrium between the targets of a path. The value of this target is the mean separation.
 BETWEEN = "path"
+# Beginning of the kind of a snapshot on the last unloading, such as "unloading_force".
+UNLOADING = "unloading_"
 # Units of the values of targets with a unit, by kind; the values of all other kinds have no unit.
 UNITS = {name: each.rule.unit for name, each in QUANTITIES.items() if each.rule.unit != "1"} | {BETWEEN: "m"}
+UNITS |= {UNLOADING + kind: unit for kind, unit in UNITS.items()}
 
 # Reason for refusing loads that need adhesion, after the load in messages.
 WITHOUT_ADHESION = "is not a load of a contact without adhesion; expected a positive load, or a positive surface_energy"
@@ -153,16 +156,23 @@ class Target:
     kind : name of the prescribed quantity, a key of `QUANTITIES`; or BETWEEN.
     value : prescribed value, in the unit of `UNITS`.
     snapshot : whether the distributions and spots of the state are saved.
+    unloading : whether the state is on the last unloading.
     """
 
     kind: str
     value: float
     snapshot: bool = False
+    unloading: bool = False
 
     @property
     def quantity(self) -> TargetQuantity:
         """Prescribed quantity; `KeyError` for the kind BETWEEN."""
         return QUANTITIES[self.kind]
+
+    @property
+    def snapshot_kind(self) -> str:
+        """Kind of the snapshot of this state: `kind`, with the beginning UNLOADING on the last unloading."""
+        return f"{UNLOADING}{self.kind}" if self.unloading else self.kind
 
     @property
     def needs_adhesion(self) -> bool:
@@ -172,7 +182,7 @@ class Target:
     def describe(self) -> str:
         """Return a text such as `area_fraction = 0.01` or `force = -300 µN`, for messages."""
         unit = UNITS.get(self.kind)
-        return f"{self.kind} = {format_quantity(self.value, unit) if unit else f'{self.value:g}'}"
+        return f"{self.snapshot_kind} = {format_quantity(self.value, unit) if unit else f'{self.value:g}'}"
 
 
 @dataclass(frozen=True, init=False)
@@ -193,8 +203,10 @@ class Path:
     snapshots : pairs (kind, value), in any order, of states of the first loading whose distributions and spots are
         saved. The kind is "reduced_pressure", "relative_load" (F/(E* A0)), "area_fraction", "mean_separation" (m),
         "pressure" (Pa), "force" (N), "indentation" (m) or "contact_radius" (m). A snapshot is an additional target
-        unless the list contains the same kind and value. Snapshots are in the dataset in the order in which the path
-        reaches them. Default: the last target of the list.
+        unless the list contains the same kind and value. A kind that begins with "unloading_", such as
+        "unloading_force", stands for a state of the last unloading; if the last unloading does not have this state,
+        there is a warning and no snapshot. Snapshots are in the dataset in the order in which the path reaches them.
+        Default: the last target of the list.
     turning_points : pairs (kind, value) at which the path turns after its last target: the first one ends unloading,
         the second one ends loading, and so on. The kinds are those of snapshots.
     unload : whether the path ends with complete separation. The last unloading meets again each target between its
@@ -214,6 +226,7 @@ class Path:
 
     targets: tuple[Target, ...]
     turning_points: tuple[Target, ...]
+    unloading_snapshots: tuple[Target, ...]
     unload: bool
     control: str
     max_step: float
@@ -248,16 +261,22 @@ class Path:
             raise ValueError(f"control: {control!r} must be one of {SEPARATION_CONTROL}, {LOAD_CONTROL}")
         max_step = STEP.validate("max_step", max_step)
         values = _validate_list(kind, lists[kind])
-        saved: list[tuple[str, float]] = _validate_snapshots([(kind, values[-1])] if snapshots is None else snapshots)
-        targets = [Target(kind, value, (kind, value) in saved) for value in values]
+        saved = _validate_snapshots([(kind, values[-1])] if snapshots is None else snapshots, unload)
+        targets = [Target(kind, value, Target(kind, value, True) in saved) for value in values]
         listed = {(kind, value) for value in values}
         turns = _validate_turning_points(turning_points, targets[-1])
-        targets += [Target(*pair, True) for pair in saved if pair not in listed]
+        on_unloading = tuple(each for each in saved if each.unloading)
+        targets += [each for each in saved if not each.unloading and (each.kind, each.value) not in listed]
         if control == LOAD_CONTROL:
-            _require_loads(targets, turns, unload)
+            _require_loads(targets, (*turns, *on_unloading), unload)
         # A frozen dataclass sets its fields this way.
         vars(self).update(
-            targets=tuple(targets), turning_points=turns, unload=unload, control=control, max_step=max_step
+            targets=tuple(targets),
+            turning_points=turns,
+            unloading_snapshots=on_unloading,
+            unload=unload,
+            control=control,
+            max_step=max_step,
         )
 
     def _repr_html_(self) -> str:
@@ -295,14 +314,19 @@ def _validate_list(kind, values):
     return values
 
 
-def _validate_snapshots(snapshots):
-    """Return a list of (kind, value) of all snapshots; raise `ValueError` if a value is out of range or repeated."""
-    saved = []
-    for label, kind, value in _label_pairs("snapshots", snapshots):
-        pair = kind, _validate_value(label, kind, value)
-        if pair in saved:
-            raise ValueError(f"{label}: {kind} {value!r} is given twice; remove one of them")
-        saved.append(pair)
+def _validate_snapshots(snapshots, unload):
+    """Return the targets of all snapshots; raise `ValueError` if a value is out of range, repeated or never reached."""
+    saved: list[Target] = []
+    for label, name, value in _label_pairs("snapshots", snapshots, (*QUANTITIES, *(UNLOADING + k for k in QUANTITIES))):
+        kind = name.removeprefix(UNLOADING)
+        target = Target(kind, _validate_value(label, kind, value), True, kind != name)
+        if target in saved:
+            raise ValueError(f"{label}: {name} {value!r} is given twice; remove one of them")
+        if target.unloading and not unload:
+            raise ValueError(
+                f"{label}: {value!r} is a state of unloading; expected `unload: true`, or unload=True in Python"
+            )
+        saved.append(target)
     return saved
 
 
@@ -336,7 +360,7 @@ def _validate_value(label, kind, value):
     return value
 
 
-def _label_pairs(name, pairs):
+def _label_pairs(name, pairs, kinds=tuple(QUANTITIES)):
     """Yield label, such as `snapshots[0]`, kind and unchecked value of each pair; `ValueError` for an unknown kind."""
     if not isinstance(pairs, list | tuple):
         raise ValueError(f"{name}: expected a list of pairs (kind, value), got {pairs!r}")
@@ -346,8 +370,8 @@ def _label_pairs(name, pairs):
             kind, value = pair
         except (TypeError, ValueError):
             raise ValueError(f"{label}: expected a pair (kind, value), got {pair!r}") from None
-        if kind not in QUANTITIES:
-            raise ValueError(f"{label}: kind {kind!r} must be one of {', '.join(QUANTITIES)}")
+        if kind not in kinds:
+            raise ValueError(f"{label}: kind {kind!r} must be one of {', '.join(kinds)}")
         yield label, kind, value
 
 

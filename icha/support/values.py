@@ -264,9 +264,12 @@ decreasing = _ordered(operator.lt, "decreasing", " m")
 
 def exactly_one(section):
     """Return a section; raise ValueError unless exactly one of its keys is given."""
-    given = sorted(name for name in section.model_fields_set if getattr(section, name) is not None)
+    optional = [name for name, field in type(section).model_fields.items() if field.default is None]
+    given = sorted(
+        name for name in section.model_fields_set.intersection(optional) if getattr(section, name) is not None
+    )
     if len(given) != 1:
-        names = ", ".join(type(section).model_fields)
+        names = ", ".join(optional)
         raise ValueError(f"given: {', '.join(given) or 'none'}; expected exactly one of {names}")
     return section
 

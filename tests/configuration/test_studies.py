@@ -78,3 +78,14 @@ def test_a_map_shows_the_first_run_with_the_requested_labels(load):
     arguments = campaign.campaign.figures.fig4_contact_map.arguments(campaign.campaign)
     assert arguments["run"] == ("one", "asperities", "rough", 2, 0.2, "soft")
     assert arguments["kind"] == "area_fraction" and set(arguments) == {"run", "kind", "target"}
+
+
+def test_snapshots_on_unloading_are_part_of_the_path(load):
+    snapshots = [{"area_fraction": 0.01}, {"area_fraction": 0.01, "branch": "unloading"}]
+    study = {"studies.one.unload": True, "studies.one.snapshots": snapshots}
+    figure = {"figures": {"fig4_contact_map": {"study": "one", "snapshot": snapshots[1]}}}
+    campaign = load(study | figure).campaign
+    path = run_settings(campaign, run_cases(campaign)[0])["path"]
+    assert path["snapshots"] == [("area_fraction", 0.01), ("unloading_area_fraction", 0.01)]
+    arguments = campaign.figures.fig4_contact_map.arguments(campaign)
+    assert (arguments["kind"], arguments["target"]) == ("unloading_area_fraction", 0.01)
