@@ -38,7 +38,7 @@ def own_solution(run, pressure, *, area=1.0, separation=1.0):
     state = state_of(run, at)
     contact = contact_of_spots(run, at, GRID)
     kept = "gap_density gap_bin_edges pressure_density pressure_bin_mean pressure_bin_edges"
-    return state[[*kept.split(), "seed", *SHARED]].assign(
+    return state[[*kept.split(), "seed", "rms_slope", *SHARED]].assign(
         contact=(("y", "x"), contact.astype(np.int8)),
         contact_area_fraction=state["contact_area_fraction"] * area,
         contact_area_fraction_raw=contact.mean(),

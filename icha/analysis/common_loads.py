@@ -125,9 +125,10 @@ def compare_runs(study: xr.Dataset) -> xr.Dataset:
 def _loads(study):
     """Return reduced pressures and relative loads of steps; NaN except at compressive targets of the first loading."""
     pressure = study["reduced_pressure"].transpose(*LABELS, "step").values
-    slope = study["rms_slope"].broadcast_like(study["status"]).transpose(*LABELS).values[..., None]
+    # The label `rms_slope` may differ from the slope of a run, if its rms height is prescribed.
+    unit = study["unit_slope"].broadcast_like(study["status"]).transpose(*LABELS).values[..., None]
     shown = loading_stops(study).transpose(*LABELS, "step").values & (pressure > 0)
-    loads = {"reduced_pressure": pressure, "relative_load": pressure * slope}
+    loads = {"reduced_pressure": pressure, "relative_load": pressure * unit}
     return {axis: np.where(shown, load, np.nan) for axis, load in loads.items()}
 
 

@@ -35,7 +35,7 @@ _LABELS = tuple(label for label in LABELS if label != "model")
 AXES = (*_LABELS, "reduced_pressure")
 
 # Variables that must be equal in a run and its reference, up to the relative difference `_ROUNDING`.
-SHARED = ("period", "rms_height", "rms_slope", "contact_modulus", "surface_energy", "interaction_range")
+SHARED = ("period", "rms_height", "rms_curvature", "contact_modulus", "surface_energy", "interaction_range")
 _ROUNDING = 1e-6
 # Quantities of which a relative error is taken.
 _POSITIVE = ("mean_separation", "contact_area_fraction")

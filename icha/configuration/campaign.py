@@ -202,6 +202,14 @@ class Campaign(Section):
         """Return the side of a surface, m; if the surface comes from a file, the file must have been read."""
         return self._grid_and_period(surface).period
 
+    def slope_of_height(self, surface: str, rms_height: float) -> float:
+        """Return the rms slope of the spectrum or the file of a surface at an rms height, m; 0 without roughness."""
+        section, topography = self.surfaces[surface], self.topography(surface)
+        if section.smooth:
+            return 0.0
+        unit = topography.rms_height if topography else section.rms_height_at_unit_slope
+        return slope_of_height(RmsHeight(rms_height), unit)
+
     def resolution(self, surface: str) -> Resolution:
         """Return the number of grid cells per shortest wave of a surface; its file must have been read."""
         section, topography = self.surfaces[surface], self.topography(surface)

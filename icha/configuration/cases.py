@@ -58,7 +58,7 @@ def run_settings(campaign: Campaign, case: RunLabels) -> dict:
     return {
         "material": campaign.materials[case.material].model_dump(exclude_none=True),
         "path": campaign.studies[case.study].path_settings(campaign.snapshots_of(case.study)),
-        "rms_slope": case.rms_slope,
+        **_scale(campaign, case.study, case),
         "seed": case.seed,
     } | ({} if case.model == DEFAULT_MODEL else {"model": case.model})
 
@@ -82,11 +82,23 @@ def _solver_settings(campaign: Campaign, entry: BesideStudy, case: SolutionLabel
     """Return the settings of the boundary-element solver, without loads."""
     return {
         "material": campaign.materials[case.material].model_dump(exclude_none=True),
-        "rms_slope": case.rms_slope,
+        **_scale(campaign, entry.study, case),
         "seed": case.seed,
         "refinement": entry.refinement,
         "tolerance": entry.tolerance,
     }
+
+
+def _scale(campaign: Campaign, study: str, case: RunLabels | SolutionLabels | ContactLabels) -> dict[str, float]:
+    """Return the rms slope of a run, and its rms height if the study prescribes rms heights, m.
+
+    The heights of each realisation are scaled to the rms height. Its rms slope then differs from that of the label,
+    which is the slope of the spectrum, unless all realisations have the same ratio of height and slope.
+    """
+    for height in campaign.studies[study].rms_heights or ():
+        if campaign.slope_of_height(case.surface, height) == case.rms_slope:
+            return {"rms_slope": case.rms_slope, "rms_height": height}
+    return {"rms_slope": case.rms_slope}
 
 
 def adhesive_contacts(campaign: Campaign, surface: str) -> list[dict]:

@@ -291,10 +291,12 @@ class Study(Section):
     roughness, has no seeds and is used once."""
     rms_slopes: Slopes = []
     """Rms slopes h'rms. The heights of each topography are scaled to these slopes. With `measured`, a topography from a
-    file keeps its own slope. A surface with `kind: smooth` has no slope: it is used once, with the rms slope 0."""
+    file keeps its own slope, and each seed of a surface with `kind: spectrum` has the slope of the spectrum. A surface
+    with `kind: smooth` has no slope: it is used once, with the rms slope 0."""
     rms_heights: Annotated[list[Length], Field(min_length=1), AfterValidator(distinct)] | None = None
     """Rms heights with unit, such as `[100 nm]`, instead of `rms_slopes`. The heights of each topography are scaled to
-    these values. The corresponding slopes are rounded to six digits."""
+    these values, also of each seed. The coordinate `rms_slope` of the results is then the slope of the spectrum at this
+    height, with six digits. With `amplitudes: gaussian`, seeds have different slopes, √(2 `spectral_moment_2`)."""
     materials: list_of_names() = []
     """Names of materials."""
     vary: Vary | None = None

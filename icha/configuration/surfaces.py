@@ -373,8 +373,9 @@ class SelfAffineSurface(_Surface):
     grid: integer(GRID)
     """Number of nodes along a side of the periodic cell."""
     amplitudes: Literal["fixed", "gaussian"] = "fixed"
-    """Amplitudes of the waves. `fixed`: the spectrum gives the square of each amplitude, so all seeds have the same rms
-    height and slope. `gaussian`: amplitudes are random, and the spectrum gives the mean square of each amplitude."""
+    """Amplitudes of the waves. `fixed`: the spectrum gives the square of each amplitude, so the ratio of rms height and
+    rms slope is the same for all seeds. `gaussian`: amplitudes are random, and the spectrum gives the mean square of
+    each amplitude. A study then scales the heights of each seed to its rms slope, or to its rms height."""
     boundary: Literal["periodic", "free"] = _BOUNDARY
     shape: ShapeSection | None = _SHAPE
 

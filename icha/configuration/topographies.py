@@ -20,6 +20,7 @@ from icha.support.values import NOTHING, Problem
 
 if TYPE_CHECKING:
     from icha.surfaces.surface import Surface
+    from icha.surfaces.tabulated_spectrum import TabulatedSpectrum
 
 
 def inspect_topographies(campaign: Campaign) -> tuple[dict[str, Topography], list[Problem]]:
@@ -58,17 +59,21 @@ def inspect_file(section: MeasuredSurface | FileSurface | SpectrumSurface) -> To
         from icha.surfaces.resolution import shortest_wave
 
         surface = read_surface(section)
-        slope = surface.rms_slope
+        slope, height = surface.rms_slope, surface.rms_height
+        if isinstance(section, SpectrumSurface):
+            # All realisations have the slope and the ratio of height and slope of the spectrum, whatever their seed.
+            spectrum = _spectrum(section)
+            slope, height = spectrum.rms_slope, spectrum.rms_height
         _KNOWN[key] = Topography(
             surface.grid,
             surface.period,
             # File names contain the slope with six digits; no instrument is more accurate.
             float(f"{slope:.6g}"),
             sha256_of(Path(section.path)),
-            surface.full_contact_energy / slope**2,
-            surface.complete_contact_pressure / slope,
-            surface.rms_height / slope,
-            surface.rms_curvature / slope,
+            surface.full_contact_energy / surface.rms_slope**2,
+            surface.complete_contact_pressure / surface.rms_slope,
+            height / slope,
+            surface.rms_curvature / surface.rms_slope,
             shortest_wave(surface),
         )
     return _KNOWN[key]
@@ -90,11 +95,7 @@ def read_surface(section: MeasuredSurface | FileSurface | SpectrumSurface, seed:
     from icha.surfaces.surface import Surface
 
     if isinstance(section, SpectrumSurface):
-        from icha.surfaces.tabulated_spectrum import read_spectrum_table
-
-        table = read_spectrum_table(section.path, section.length_unit, section.convention)
-        spectrum = table.in_cell(section.period)
-        surface = spectrum.realise(section.grid, seed, section.amplitudes)
+        surface = _spectrum(section).realise(section.grid, seed, section.amplitudes)
         return _with_shape(replace(surface, boundary="free") if section.free else surface, section)
     from icha.surfaces.measured.scan import read_height_map
 
@@ -102,6 +103,14 @@ def read_surface(section: MeasuredSurface | FileSurface | SpectrumSurface, seed:
         read_height_map(section.path, section.height_unit), section.period, "free" if section.free else "periodic"
     )
     return _with_shape(surface, section)
+
+
+def _spectrum(section: SpectrumSurface) -> TabulatedSpectrum:
+    """Read the spectrum of a surface of kind `spectrum`, in its periodic cell."""
+    from icha.surfaces.tabulated_spectrum import read_spectrum_table
+
+    table = read_spectrum_table(section.path, section.length_unit, section.convention)
+    return table.in_cell(section.period)
 
 
 def _with_shape(surface, section):

@@ -7,6 +7,7 @@ import os
 import pickle
 from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
@@ -24,7 +25,7 @@ from icha.datasets.variables.campaign import (
     RAGGED,
     STATUS_ATTRIBUTES,
     VARIES_WITH,
-    VARIES_WITH_SHAPES,
+    VARIES_WITH_OWN_UNITS,
     WHOLE_RUNS,
 )
 from icha.datasets.variables.run import CELLS, CYCLE, INDENTER, LOOP, OF_MODELS, RUN
@@ -36,6 +37,8 @@ Values = dict[str, tuple[tuple[str, ...], np.ndarray]]
 LabelledRun = tuple[RunLabels | tuple, xr.Dataset | str | os.PathLike]
 
 _DIMS = {name: description.dims for name, description in (RUN | OF_MODELS | CYCLE | LOOP | INDENTER).items()}
+# Two units of slopes count as equal up to this relative difference, because scaling of surfaces causes rounding errors.
+_SAME_UNIT = 1e-9
 _ENDED_EARLY = (INCOMPLETE, BEYOND_MODEL)
 _ATTRIBUTES = ("contact_model", "config_sha256", "applicability", *STATUS_ATTRIBUTES.values())
 
@@ -78,6 +81,7 @@ class Entry(NamedTuple):
     status : status of the run before ICHA checks that the run has all snapshots of its study.
     failure : reason why the run is not complete; "" for a complete run.
     applicability : reason why the model is not applicable to the run; "" if it is applicable.
+    unit_slope : unit of slopes of the run, to which its bins of pressures are proportional; NaN if it has none.
     """
 
     labels: RunLabels
@@ -90,6 +94,7 @@ class Entry(NamedTuple):
     status: int
     failure: str
     applicability: str
+    unit_slope: float
 
     @property
     def extent(self) -> tuple[bool, int, int]:
@@ -138,6 +143,7 @@ def spool_runs(
             stored.setdefault(snapshots, snapshots),
             *_status_and_failure(attrs),
             str(attrs.get("applicability", "")),
+            float(values["unit_slope"][1]) if "unit_slope" in values else np.nan,
         )
         pickle.dump(values, spool, protocol=5)
     return studies
@@ -204,12 +210,20 @@ class Arrangement:
         """Dimensions of the coordinate `rms_slope`. They include `surface` if surfaces have different slopes."""
         return slope_dims(self.known["rms_slope"])
 
+    @cached_property
+    def own_units(self) -> bool:
+        """True if runs of equal rms slopes may have different units of slopes: with shapes, and with rms heights."""
+        units: dict[float, list[float]] = {}
+        for entry in self.entries:
+            units.setdefault(entry.labels.rms_slope, []).append(entry.unit_slope)
+        return "shape" in self.variables or any(max(each) > (1 + _SAME_UNIT) * min(each) for each in units.values())
+
     def dims_of(self, name: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Return the labels (none for spots and events) and the other dimensions along which a variable is stored."""
         dims = self.variables[name].dims
         if name in self.sizes or set(RAGGED) & set(dims):
             return (), dims
-        along = (VARIES_WITH_SHAPES if "shape" in self.variables else VARIES_WITH).get(name, LABELS)
+        along = (VARIES_WITH_OWN_UNITS if self.own_units else VARIES_WITH).get(name, LABELS)
         if "rms_slope" in along and not set(self.slope_dims) <= set(along):
             along = tuple(label for label in LABELS if label in {*along, *self.slope_dims})
         return along, dims

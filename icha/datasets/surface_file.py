@@ -116,6 +116,12 @@ def read_surface(path: str | os.PathLike) -> Surface:
         raise ValueError(f"{path}: {error}") from None
 
 
+def read_scaled_surface(path: str | os.PathLike, rms_slope: float, rms_height: float | None = None) -> Surface:
+    """Read the topography of a surface file, scaled to an rms slope, or to an rms height (m) if one is given."""
+    surface = read_surface(path)
+    return surface.scaled_to_rms_slope(rms_slope) if rms_height is None else surface.scaled_to_rms_height(rms_height)
+
+
 def read_spectral_moments(path: str | os.PathLike) -> SpectralMoments:
     """Read the spectral moments from a surface file, without reading the heights.
 

@@ -151,4 +151,4 @@ def _draw_measured(ax, points, load, area, known, look):
 
 
 def _area_at_load(run):
-    return run["reduced_pressure"].values * float(run["rms_slope"]), run["contact_area_fraction"].values
+    return run["reduced_pressure"].values * float(run["unit_slope"]), run["contact_area_fraction"].values

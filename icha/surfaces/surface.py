@@ -350,6 +350,10 @@ class Surface:
         vars(scaled)["spectral_moments"] = tuple(moment * factor**2 for moment in self.spectral_moments)
         return scaled
 
+    def scaled_to_rms_height(self, rms_height: float) -> Surface:
+        """Return the surface with heights scaled to the rms height `rms_height`, m; a smooth surface is not scaled."""
+        return self if self.smooth else self.scaled_to_rms_slope(self.rms_slope * rms_height / self.rms_height)
+
     def refined(self, factor: int) -> Surface:
         """Interpolate the heights by Fourier series on a grid `factor` times as fine; old nodes keep their heights.
 

@@ -222,7 +222,8 @@ def test_data_names_one_of_several_arrays_of_a_measured_file(project):
     file = CAMPAIGNS / "two.yaml"
     text = file.read_text()
     assert "It runs once the keys marked" in text and "lateral_unit" not in text
-    file.write_text(text.replace("size: ", "size: 16 um").replace("boundary: ", "boundary: free"))
+    text = text.replace("size: ", "size: 16 um").replace("boundary: ", "boundary: free")
+    file.write_text(f"{text}confirmed: [surfaces.my.grid]\n")
     assert load_configuration(file).campaign.surfaces["my"].data == "second"
     with netCDF4.Dataset("my.nc", "w") as file:
         file.createDimension("row", 64)
@@ -294,7 +295,7 @@ def test_a_scan_is_analysed_before_anything_is_computed(project):
     few = r"surfaces\.scan\.grid: \d+ is unusual \((\S+) cells per shortest wave, estimated from the spectrum\)"
     assert 1 < float(re.search(few, refused)[1]) < 4 and "or `cutoff: " in refused
     summits = int(re.search(r"(\d+) summits?, ", written)[1])
-    file.write_text(f"{text}confirmed: [surfaces.scan.grid]\n")
+    file.write_text(text.replace("confirmed: [", "confirmed: [surfaces.scan.grid, "))
     confirmed = output("describe", "mine")
     assert f"recommended: `cutoff: {cutoff}`" in confirmed and "grid: few grid cells: scan has " in confirmed
     # Uncommenting the recommended key is enough; the noise of the scan remains, its summits do not.

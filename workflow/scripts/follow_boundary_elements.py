@@ -4,13 +4,13 @@ from job import attributes, job_context
 
 from icha.asperity.material import Material
 from icha.datasets.files import write_dataset
-from icha.datasets.surface_file import read_surface
+from icha.datasets.surface_file import read_scaled_surface
 from icha.references.finite_range_loops import finite_range_loop
 
 
-def follow_boundary_elements(surface, output, *, rms_slope, material, attributes, **settings):
-    """Compute and write a cycle of loading and unloading for a surface whose heights are scaled to `rms_slope`."""
-    scaled = read_surface(surface).scaled_to_rms_slope(rms_slope)
+def follow_boundary_elements(surface, output, *, rms_slope, material, attributes, rms_height=None, **settings):
+    """Compute and write a cycle of loading and unloading; arguments are those of `solve_boundary_elements`."""
+    scaled = read_scaled_surface(surface, rms_slope, rms_height)
     write_dataset(finite_range_loop(scaled, Material(**material), **settings).assign_attrs(attributes), output)
 
 

@@ -12,7 +12,7 @@ from icha.asperity.material import Material
 from icha.contact.checkpoints import prepare_checkpoints
 from icha.contact.models import DEFAULT_MODEL
 from icha.datasets.files import write_dataset
-from icha.datasets.surface_file import read_surface
+from icha.datasets.surface_file import read_scaled_surface
 from icha.path.targets import Path
 from icha.simulation import ConvergenceError, empty_run, simulate
 
@@ -21,7 +21,18 @@ MACHINE_ERRORS = (OSError, MemoryError, ImportError)
 
 
 def run_sweep(
-    surface, output, *, rms_slope, seed, material, path, attributes, progress, model=DEFAULT_MODEL, kept=None
+    surface,
+    output,
+    *,
+    rms_slope,
+    seed,
+    material,
+    path,
+    attributes,
+    progress,
+    rms_height=None,
+    model=DEFAULT_MODEL,
+    kept=None,
 ):
     """Compute a run and write its dataset.
 
@@ -31,14 +42,14 @@ def run_sweep(
 
     Parameters
     ----------
-    surface : file of the surface; its heights are scaled to `rms_slope`.
+    surface : file of the surface; its heights are scaled to `rms_height`, or to `rms_slope` without an `rms_height`.
     output : file to write.
-    rms_slope, seed, material, path, model : settings of the run, in SI units.
+    rms_slope, rms_height, seed, material, path, model : settings of the run, in SI units.
     attributes : attributes of the dataset.
     progress : function that prints a line of progress.
     kept : folder of checkpoints; None for a run without checkpoints.
     """
-    contact = read_surface(surface).scaled_to_rms_slope(rms_slope), Material(**material), Path(**path)
+    contact = read_scaled_surface(surface, rms_slope, rms_height), Material(**material), Path(**path)
     try:
         dataset = simulate(*contact, model=model, seed=seed, progress=progress, kept=kept)
     except ConvergenceError as error:

@@ -4,13 +4,13 @@ from job import attributes, job_context
 
 from icha.asperity.material import Material
 from icha.datasets.files import write_dataset
-from icha.datasets.surface_file import read_surface
+from icha.datasets.surface_file import read_scaled_surface
 from icha.references.finite_range import finite_range_solution
 
 
-def solve_boundary_elements(surface, output, *, rms_slope, material, attributes, **settings):
-    """Compute and write the solution for a surface whose heights are scaled to `rms_slope`."""
-    scaled = read_surface(surface).scaled_to_rms_slope(rms_slope)
+def solve_boundary_elements(surface, output, *, rms_slope, material, attributes, rms_height=None, **settings):
+    """Compute and write the solution for a surface whose heights are scaled to `rms_slope`, or to `rms_height`."""
+    scaled = read_scaled_surface(surface, rms_slope, rms_height)
     solution = finite_range_solution(scaled, Material(**material), **settings)
     write_dataset(solution.assign_attrs(attributes), output)
 

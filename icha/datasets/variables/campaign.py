@@ -59,5 +59,5 @@ VARIES_WITH = {
     **dict.fromkeys(bin_table("pressure", "Pa"), ("rms_slope", "material")),
     **dict.fromkeys(("snapshot_kind", "snapshot_target", "control"), ()),
 }
-# The same in a study with shapes, where the unit of slopes depends on the shape and on the roughness.
-VARIES_WITH_SHAPES = VARIES_WITH | dict.fromkeys(bin_table("pressure", "Pa"), (*_TOPOGRAPHY, "material"))
+# The same in a study with shapes or rms heights, where runs of equal rms slopes have different units of slopes.
+VARIES_WITH_OWN_UNITS = VARIES_WITH | dict.fromkeys(bin_table("pressure", "Pa"), (*_TOPOGRAPHY, "material"))
