@@ -6,7 +6,7 @@ import yaml
 from conftest import REPOSITORY
 from demo_configuration import GOOD
 
-from icha.analysis.common_loads import common_loads
+from icha.analysis.common_loads import compare_runs
 from icha.asperity.material import Material
 from icha.configuration.cases import run_cases, run_settings, surface_settings
 from icha.configuration.load import load_configuration
@@ -101,6 +101,6 @@ def test_runs_of_one_height_stand_side_by_side_in_the_dataset(runs):
     slopes = np.sqrt(2 * study["spectral_moment_2"].squeeze().values)
     assert study.sizes["rms_slope"] == 1 and np.ptp(slopes) > 0.05 * slopes.max()
     # Relative loads p/E* are those of the runs, not of the label.
-    load = common_loads(study)["relative_load"].values
+    load = compare_runs(study)["relative_load"].values
     pressure = study["nominal_pressure"].squeeze().values
     assert pressure.min() / 25e6 <= load.min() * (1 + 1e-9) and load.max() <= pressure.max() / 25e6 * (1 + 1e-9)
