@@ -43,6 +43,7 @@ from icha.path.targets import (
     CONTACT_RADIUS,
     FORCE,
     INDENTATION,
+    LEAST_GAP,
     LEAST_PRESSURE,
     MAX_AREA_FRACTION,
     MAX_REDUCED_PRESSURE,
@@ -65,8 +66,6 @@ from icha.surfaces.shapes import describe_shape
 from icha.surfaces.summits import SummitCoverage, locate_summits
 from icha.surfaces.surface import Surface, full_contact_pressure
 
-# A contact area may exceed its limit by this fraction, because equilibria have small errors.
-_AREA_TOLERANCE = 1e-6
 # Largest mean separation of a snapshot, in h_rms. Contact forms at much smaller separations.
 _HIGHEST_SNAPSHOT = 20.0
 # Contact is concentrated at the edges of a free square if the share of contact in the outermost cells exceeds both the
@@ -253,10 +252,13 @@ def _dataset(surface, material, path, name, seed, record, summits, reasons, of_c
         table | CYCLE | INDENTER | _describe_targets(table, path), values, _attributes(surface, material, path, name)
     )
     if MODELS[name].by_summits:
-        largest = max((step["contact_area_fraction"] for step in record.steps), default=0.0)
         ratio = math.inf if surface.smooth else values["full_contact_energy_ratio"]
+        # Contact area and mean gap of the square say nothing about the contact of a shape.
         conformal = surface.shape is not None
-        applicability = asperity_applicability(ratio, reasons, largest, conformal=conformal)
+        rough = [] if conformal else record.steps
+        largest = max((step["contact_area_fraction"] for step in rough), default=0.0)
+        gap = min((step["mean_gap"] for step in rough), default=math.inf) / surface.unit_height
+        applicability = asperity_applicability(ratio, reasons, largest, gap, conformal=conformal)
     else:
         applicability = f"{MODELS[name].words} not applicable: {'; '.join(reasons)}" if reasons else ""
     dataset.attrs["applicability"] = applicability
@@ -282,6 +284,7 @@ def asperity_applicability(
     full_contact_energy_ratio: float,
     summit_reasons: Sequence[str] = (),
     contact_area_fraction: float = 0.0,
+    reduced_gap: float = math.inf,
     *,
     conformal: bool = False,
 ) -> str:
@@ -292,6 +295,7 @@ def asperity_applicability(
     full_contact_energy_ratio : elastic energy of full contact divided by work of adhesion; infinite without adhesion.
     summit_reasons : reasons why the summits do not represent the surface.
     contact_area_fraction : largest contact area fraction A/A0 of the run.
+    reduced_gap : smallest mean gap of the run, divided by the rms height.
     conformal : True for roughness on a shape that presses it into the elastic body.
     """
     reasons, ratio = [], f"U_full/dgamma = {full_contact_energy_ratio:.3g}"
@@ -301,11 +305,16 @@ def asperity_applicability(
             f"{HIGH_PULL_OFF_BELOW:g})"
         )
     reasons += summit_reasons
-    # The contact area on a shape is no measure of the distance between spots.
-    limit = MAX_AREA_FRACTION if conformal else largest_area_fraction(full_contact_energy_ratio)
-    if contact_area_fraction > limit * (1 + _AREA_TOLERANCE):
-        because = f", because adhesion unites neighbouring spots ({ratio})" if limit < MAX_AREA_FRACTION else ""
-        reasons.append(f"contact area A/A0 = {contact_area_fraction:.3g}, more than {limit:.3g}{because}")
+    limit = largest_area_fraction(full_contact_energy_ratio)
+    if contact_area_fraction > limit:
+        reasons.append(
+            f"contact area A/A0 = {contact_area_fraction:.3g}, more than {limit:.3g}: adhesion unites neighbouring "
+            f"spots ({ratio})"
+        )
+    if reduced_gap < LEAST_GAP:
+        reasons.append(
+            f"mean gap of {reduced_gap:.3g} rms heights, less than {LEAST_GAP:g}: the surfaces overlap beside the spots"
+        )
     return f"asperity model not applicable: {'; '.join(reasons)}" if reasons else ""
 
 

@@ -284,8 +284,8 @@ def test_snapshots_at_states_of_the_last_unloading(model):
 
 
 def test_a_model_that_is_not_applicable_gives_a_warning():
-    with pytest.warns(IchaWarning, match="asperity model not applicable: full contact has a lower energy"):
-        simulate(rough(slope=0.1), Material(1e6, 0.5), Path(mean_separations=[8 * rough(slope=0.1).rms_height]))
+    with pytest.warns(IchaWarning, match="asperity model not applicable: mean gap of 0.2 rms heights"):
+        simulate(rough(), Material(1e6, 0.0), Path(mean_separations=[0.2 * rough().rms_height]))
 
 
 def test_a_smooth_sphere_pulls_off_as_jkr_says_also_if_an_area_lies_inside_its_jump():

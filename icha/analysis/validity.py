@@ -197,7 +197,7 @@ def _full_contact(cases):
     limit = largest_area_fraction(min(ratios, default=math.inf))
     if limit < MAX_AREA_FRACTION:
         text += f"; the asperity model is applicable up to the contact area A/A0 = {limit:.2g}"
-    yield Statement("adhesion", text, lowest.ratio >= HIGH_PULL_OFF_BELOW and limit == MAX_AREA_FRACTION)
+    yield Statement("adhesion", text, lowest.ratio >= HIGH_PULL_OFF_BELOW and limit >= MAX_AREA_FRACTION)
 
 
 def _unresolved_strength(facts):

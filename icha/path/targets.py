@@ -17,9 +17,10 @@ from icha.support.rules import FORCES, INDENTATIONS, LENGTH, NUMBER, PRESSURES, 
 # separate, and without adhesion the mean gap soon becomes zero.
 MAX_REDUCED_PRESSURE = 0.15
 MAX_AREA_FRACTION = 0.25
-# Largest contact area fraction of the asperity model with strong adhesion, divided by U_full/dgamma. Chosen on thirty
-# surfaces, and tested on thirty others (`validation/applicability.py`).
+# Limits of the asperity model, chosen on thirty surfaces and tested on thirty others (`validation/applicability.py`):
+# largest contact area fraction, divided by U_full/dgamma, and smallest mean gap, divided by h_rms.
 _AREA_PER_ENERGY_RATIO = 0.02
+LEAST_GAP = 0.3
 # Largest reduced pressure of any target. Rough surfaces are in full contact at a reduced pressure of about 1.
 LARGEST_REDUCED_PRESSURE = 100.0
 # Smallest nonzero reduced pressure and smallest area fraction. Smaller values are below the error of an equilibrium.
@@ -144,7 +145,7 @@ def largest_area_fraction(energy_ratio: float) -> float:
 
     energy_ratio : U_full/dgamma, the elastic energy of full contact divided by the work of adhesion.
     """
-    return min(MAX_AREA_FRACTION, _AREA_PER_ENERGY_RATIO * energy_ratio)
+    return _AREA_PER_ENERGY_RATIO * energy_ratio
 
 
 @dataclass(frozen=True)
