@@ -3,8 +3,8 @@
 python -m validation.applicability
 
 The surfaces are of ten kinds. Adhesion ranges from none to so strong that full contact has the lower energy. Results of
-boundary elements are saved case by case, so an interrupted command resumes. The asperity model is computed anew. The
-limit of the contact area (`icha.path.targets.largest_area_fraction`) was chosen on the first half of the surfaces.
+boundary elements are saved case by case, so an interrupted command resumes. The asperity model is computed anew. All
+surfaces were examined when the limits of contact area and gap (`icha.path.targets`) were chosen.
 """
 
 from __future__ import annotations

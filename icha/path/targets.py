@@ -17,8 +17,8 @@ from icha.support.rules import FORCES, INDENTATIONS, LENGTH, NUMBER, PRESSURES, 
 # separate, and without adhesion the mean gap soon becomes zero.
 MAX_REDUCED_PRESSURE = 0.15
 MAX_AREA_FRACTION = 0.25
-# Limits of the asperity model, chosen on thirty surfaces and tested on thirty others (`validation/applicability.py`):
-# largest contact area fraction, divided by U_full/dgamma, and smallest mean gap, divided by h_rms.
+# Limits of the asperity model, from a comparison on sixty surfaces (`validation/applicability.py`): largest contact
+# area fraction, divided by U_full/dgamma, and smallest mean gap, divided by h_rms.
 _AREA_PER_ENERGY_RATIO = 0.02
 LEAST_GAP = 0.3
 # Largest reduced pressure of any target. Rough surfaces are in full contact at a reduced pressure of about 1.
