@@ -222,3 +222,36 @@ def test_an_accuracy_is_reached_with_seeds_that_stay(tmp_path):
     assert f"contact area ± {100 * reached:.2g} % (30 % required)" in output.splitlines()[-1]
     assert reached <= 0.3 or "Not reached" in output.splitlines()[-1]
     assert "Nothing to do" in run(project)
+
+
+# At the end of `run_sweep`: one run of boundary elements fails a check.
+FAIL = """    if seed == 2 and model != DEFAULT_MODEL and "coarse" not in attributes["study"]:
+        dataset = dataset.assign_attrs(failed_checks="residual: 1.12e-08 (largest error); expected at most 1e-08")
+"""
+FIGURE = "figures: {fig2_area_and_gap: {study: load}}\n"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seeds", ["accuracy: 30 %", "seeds: [1, 2, 3]\n    models: [boundary_elements]"])
+def test_one_failed_run_leaves_figures_report_and_answers_which_count_it(tmp_path, seeds):
+    project = copy_project(REPOSITORY, tmp_path / "project")
+    script = project / "workflow/scripts/run_sweep.py"
+    end = "    write_dataset(dataset.assign_attrs(attributes), output)"
+    assert script.read_text().count(end) == 1
+    script.write_text(script.read_text().replace(end, FAIL + end))
+    asked = TINY.replace("grid: 32", "grid: 40").replace("[bare, soft]", "[bare]").replace("seeds: [1, 2]", seeds)
+    (project / "config/campaigns/tiny.yaml").write_text(asked + FIGURE)
+    output = run(project, status=1)
+    results = project / "results/tiny"
+    assert "1 run failed; all reasons: results/tiny/logs/failed_runs.txt" in output
+    assert "checks of the solved equations passed" in output
+    for file in ("figures/fig2_area_and_gap.png", "dataset/tiny.nc", "report.html"):
+        assert (results / file).is_file()
+    with xr.open_datatree(results / "aggregated/answers.nc") as answers:
+        words = answers["load"]["left_out"].values.tolist()
+    assert all(" seeds of boundary elements; 1 failed a check" in each for each in words)
+    assert "1 failed a check" in (results / "figures/fig2_area_and_gap.txt").read_text()
+    assert "1 failed a check" in (results / "report.html").read_text()
+    if "accuracy" in seeds:
+        assert (results / "levels.yaml").is_file()
+        assert "(30 % required); " in output.splitlines()[-1] and words[0] in output.splitlines()[-1]
