@@ -44,6 +44,16 @@ class Checksum(NamedTuple):
     inputs: Mapping[str, str] = {}
 
 
+class LongText(str):
+    """Text as a parameter of a job; Snakemake prints, records and compares its checksum instead of the text."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        """Return the SHA-256 of the text."""
+        return f"sha256:{hashlib.sha256(self.encode()).hexdigest()}"
+
+
 def hash_parameters(parameters: Iterable[str]) -> str:
     """Return the checksum of the parameters of a job, from their Python representations in any order."""
     return hashlib.sha256("\n".join(sorted(parameters)).encode()).hexdigest()

@@ -3,12 +3,14 @@
 import hashlib
 import json
 import os
+import pickle
 import random
 import shutil
 
 import pytest
 
 from icha.support.checksums import (
+    LongText,
     begin,
     damaged,
     distrust,
@@ -185,3 +187,10 @@ def test_sidecars_of_results_that_are_read_only_need_not_be_written(results, mon
     assert is_whole(results, PATH)
     flip(results / PATH, 0)
     assert not is_whole(results, PATH)
+
+
+def test_a_long_text_shows_its_checksum_also_in_another_process():
+    text = LongText("title: A\n" * 1000)
+    again = pickle.loads(pickle.dumps(text))
+    assert again == "title: A\n" * 1000 and repr(again) == repr(text)
+    assert repr(text) == f"sha256:{hashlib.sha256(text.encode()).hexdigest()}" and repr(LongText("b")) != repr(text)
