@@ -328,7 +328,8 @@ class Campaign(Section):
         """Return the radii (m) of the contacts that theory expects of a smooth shape, by location of kind and value.
 
         The locations are those of targets and turning points; () is the contact after the jump-in, with adhesion. On a
-        layer, only the radii at indentations are expected, because the contact is larger than on a half-space.
+        layer without adhesion, the radius at an indentation is that of a half-space, which is smaller. With adhesion
+        the contact on a layer may be smaller than on a half-space, so only radii that are targets are known.
         """
         from icha.references.indentation import contact_radius_at
 
@@ -339,8 +340,12 @@ class Campaign(Section):
                 return value
             return contact_radius_at(kind, value, shape, section.contact_modulus, section.surface_energy)
 
-        known = (INDENTATION, CONTACT_RADIUS) + ((FORCE,) if not section.thickness else ())
-        radii = {(): radius(INDENTATION, 0.0)} if section.surface_energy else {}
+        known, radii = {CONTACT_RADIUS}, {}
+        if not (section.thickness and section.surface_energy):
+            known.add(INDENTATION)
+        if not section.thickness:
+            known.add(FORCE)
+            radii = {(): radius(INDENTATION, 0.0)} if section.surface_energy else {}
         return radii | {at: radius(kind, value) for at, kind, value in study.states() if kind in known}
 
     def _edge_problems(self, study: Study) -> Iterator[Problem]:

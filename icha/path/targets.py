@@ -118,8 +118,15 @@ ESTIMATED_AT_TARGETS: dict[str, tuple[str, ...]] = {
 ESTIMATED_OF_LOOPS: tuple[str, ...] = ("pull_off_pressure", "hysteresis_loss")
 # Quantities per nominal area, which mean nothing for a single square such as a lens, and further ones for a square.
 PER_NOMINAL_AREA = (*ESTIMATED_AT_TARGETS.keys() - {"spot_count"}, *ESTIMATED_OF_LOOPS)
-OF_SQUARES = ("contact_radius", "stiffness", "force", "pull_off_force", "loss_over_contact")
-OF_SQUARES += ("work_of_adhesion_approach", "work_of_adhesion_retraction")
+OF_SQUARES = (
+    "contact_radius",
+    "stiffness",
+    "force",
+    "pull_off_force",
+    "loss_over_contact",
+    "work_of_adhesion_approach",
+    "work_of_adhesion_retraction",
+)
 ESTIMATED_AT_TARGETS |= {"contact_radius": AREAS, "stiffness": (), "force": LOADS}
 ESTIMATED_OF_LOOPS += tuple(name for name in OF_SQUARES if name not in ESTIMATED_AT_TARGETS)
 # Kind of the target of an equilibrium between the targets of a path. The value of this target is the mean separation.
