@@ -138,6 +138,7 @@ class Asperities:
             **get_values(self.material, *MATERIAL),
             "rms_slope": self.rms_slope,
             "rms_height": self.rms_height,
+            "rms_curvature": 1 / self.radius_of_curvature,
             "unit_slope": self.rms_slope,
             "unit_height": self.rms_height,
             "boundary": "periodic",

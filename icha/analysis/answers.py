@@ -51,7 +51,8 @@ class Answer(NamedTuple):
     value, low, high : estimate and ends of its interval in `unit`; NaN if none is stated.
     unit : unit; "" for counts.
     shares : half-width in `unit` by cause: seeds, model, grid, inputs.
-    note : text about runs that are left out, and about seeds with full contact; empty if there are none.
+    note : text about runs that are left out, about seeds with full contact, and about an error of the grid that the
+        interval does not contain; empty if there are none.
     limit : sentence that names what limits the accuracy.
     """
 
@@ -124,6 +125,7 @@ def _answer(row: xr.Dataset) -> Answer:
     notes = [str(row["left_out"].item()) if "left_out" in row else ""]  # not in results of earlier versions
     if row["full_contact_seeds"]:
         notes.append(f"full contact in {int(row['full_contact_seeds'])} of {int(row['fine_seeds'])} seeds")
+    notes.append(str(row["grid_error"].item()) if "grid_error" in row else "")
     return Answer(
         f"{row['material'].item()} on {row['surface'].item()}, h'rms = {float(row['rms_slope']):.4g}",
         "" if kind == LOOP else state_words(kind, float(row["stop_target"])),

@@ -14,6 +14,7 @@ import numpy as np
 import xarray as xr
 
 from icha.analysis.control_variates import PROBABILITY, estimate_quantity
+from icha.analysis.grid_error import cells_of_length, error_beyond, nodes_of
 from icha.analysis.left_out import NOT_POSITIVE, causes_of_runs, find_left_out, varied_parameters
 from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
 from icha.datasets.attributes import DERIVED, combine_attributes
@@ -67,6 +68,9 @@ def _answers(
         return
     levels = {"asperities": (study if asperities else None, DEFAULT_MODEL), "coarse": (coarse, REFERENCE_MODEL)}
     levels |= {"fine": (study, REFERENCE_MODEL)}
+    runs = study.sel(model=REFERENCE_MODEL)
+    of_runs = cells_of_length(runs), nodes_of(runs)
+    lengths, nodes = (each.broadcast_like(runs["status"]).min("seed").transpose(*CONTACT).values for each in of_runs)
     every = (*ESTIMATED_AT_TARGETS, *ESTIMATED_OF_LOOPS)
     for (kind, target), quantity in itertools.product([*stops_of(study), (LOOP, 0.0)], every):
         prescribed = kind in ESTIMATED_AT_TARGETS.get(quantity, ())
@@ -75,6 +79,7 @@ def _answers(
         values = {level: values_of(data, model, quantity, kind, target) for level, (data, model) in levels.items()}
         known = study[quantity].notnull().any([dim for dim in study[quantity].dims if dim != "surface"]).values
         areas = values_of(study, REFERENCE_MODEL, "contact_area_fraction", kind, target) if kind != LOOP else None
+        patches = values_of(study, REFERENCE_MODEL, "spot_count", kind, target) if kind != LOOP else None
         for place in itertools.product(*(range(study.sizes[dim]) for dim in CONTACT)):
             if quantity in OF_SQUARES and not known[place[0]]:
                 continue  # a periodic surface
@@ -87,6 +92,8 @@ def _answers(
             share_inputs, *of_cases = _scatter_of_inputs(inputs, quantity, kind, target)
             left_out += of_cases
             surface, slope, material = place
+            area, count = (_mean_at(each, place) for each in (areas, patches))
+            known_error = mean.relative.grid if mean else math.nan
             yield {
                 "quantity": quantity,
                 "units": study[quantity].attrs["units"],
@@ -95,6 +102,7 @@ def _answers(
                 "material": str(study["material"].values[material]),
                 "stop_kind": kind,
                 "stop_target": target,
+                "grid_error": error_beyond(known_error, quantity, lengths[place], count, area * nodes[place]),
                 "share_inputs": share_inputs,
                 **_estimate(quantity, mean, share_inputs, all(each.has_interval for each in left_out)),
                 "asperity_seeds": len(by_seed["asperities"]),
@@ -158,6 +166,12 @@ def _levels_at(values, place):
             lacking = causes
             left_out.append(find_left_out(_SEEDS_OF[level], list(causes.values())))
     return by_seed, left_out
+
+
+def _mean_at(of_level, place):
+    """Return the mean over the seeds of a level for a contact; NaN without values."""
+    values = _levels_at({"fine": of_level}, place)[0]["fine"].values()
+    return sum(values) / len(values) if values else math.nan
 
 
 def _scatter_of_inputs(inputs, quantity, kind, target):

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from icha.analysis.grid_error import cells_of_loops, describe_lightest_state, describe_loops, is_resolved
 from icha.asperity.full_contact import HIGH_PULL_OFF_BELOW, MEANING, expected_behaviour
 from icha.asperity.material import WU_HOLDS_FROM
 from icha.asperity.tabor import SHORT_RANGE_FROM, describe_short_range
@@ -22,7 +23,7 @@ from icha.datasets.campaign import loading_stops
 from icha.datasets.labels import LABELS, is_derived_study
 from icha.datasets.variables.campaign import COMPUTED_RUNS
 from icha.path.targets import MAX_AREA_FRACTION, largest_area_fraction
-from icha.support.formatting import format_count, format_quantity
+from icha.support.formatting import format_count, format_quantity, join_first
 from icha.surfaces.resolution import LEAST_CELLS, RADIUS, RECOMMENDED_CELLS, Resolution
 
 if TYPE_CHECKING:
@@ -52,8 +53,6 @@ _OF_FULL_CONTACT = (COMPLETE, STRENGTH, THEORETICAL, RESOLVED)
 
 # ICHA warns if more than this fraction of the single-asperity spots is outside the range of Wu's formula.
 _FEW = 0.05
-# Largest number of cases that a statement names.
-_MOST_NAMES = 4
 
 
 class Range(NamedTuple):
@@ -142,6 +141,7 @@ def statements(
     cases: Iterable[Case],
     outside: str | None = None,
     sticky: Collection[str] = (),
+    loops: Mapping[tuple[str, str], float] = {},
 ) -> list[Statement]:
     """Return statements on the validity of the models of a campaign, one line for each subject.
 
@@ -152,6 +152,7 @@ def statements(
     outside : text with the surfaces and materials whose jumps into contact are outside the verified range; "" if there
         are none; None without adhesion.
     sticky : surfaces and materials whose attraction outweighs repulsion, from `describe_sticky`.
+    loops : cells in the length of loops by boundary elements (`icha.analysis.grid_error.cells_of_loops`).
     """
     cases = list(cases)
     found = [Statement("models", _used(models)), *_full_contact(cases)]
@@ -162,6 +163,8 @@ def statements(
         text = f"attraction outweighs repulsion: {join_first(sticky)}; errors can be many times those of the validation"
         found.append(Statement("sticky", text, False))
     found += [*_resolution(cases), *_short_range(cases)]
+    if loops:
+        found.append(Statement("loops", describe_loops(loops), is_resolved(loops)))
     of_asperities = [case for case in cases if MODELS[case.model].by_summits]
     if of_asperities:
         found.append(_accuracy(of_asperities, len(of_asperities) < len(cases)))
@@ -265,13 +268,6 @@ def _accuracy(cases, measured):
     return Statement("accuracy", f"{known}; {text}" if known else text, False)
 
 
-def join_first(cases: Iterable[str], between: str = ", ") -> str:
-    """Join the first texts of a list to one text, and append how many more texts there are."""
-    cases = list(cases)
-    more = len(cases) - _MOST_NAMES
-    return between.join(cases[:_MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
-
-
 def statements_on_dataset(campaign: xr.DataTree) -> list[Statement]:
     """Return statements on the validity of the models for a campaign dataset, including runs that ended early.
 
@@ -290,7 +286,9 @@ def statements_on_dataset(campaign: xr.DataTree) -> list[Statement]:
                 found = study["stickiness"].sel(surface=surface, material=material)
                 sticky[surface, material] = max(float(found.max()), sticky.get((surface, material), 0.0))
     outside = _describe_shares(shares) if shares else None
-    found = statements(models, cases, outside, describe_sticky(sticky))
+    found = statements(models, cases, outside, describe_sticky(sticky), cells_of_loops(campaign, models))
+    if lightest := describe_lightest_state(campaign, models):
+        found.append(Statement("grid", lightest))
     return [*found, *describe_layers(_radii_on_layers(campaign)), *_not_applicable(campaign)]
 
 

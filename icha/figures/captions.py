@@ -29,13 +29,20 @@ def _texts() -> dict[str, str]:
 _CONDITIONAL = re.compile(r"\[([^\]:]+): (.*?)\] ?")
 
 
-def caption_of(name: str, shown: str) -> str:
-    """Return the caption of a figure; `shown` are lines that tell what the figure shows, from `texts_of`."""
+def caption_of(name: str, shown: str, grid: str = "") -> str:
+    """Return the caption of a figure.
+
+    Parameters
+    ----------
+    name : name of the figure.
+    shown : lines that tell what the figure shows, from `texts_of`.
+    grid : sentence on the error of loops due to the grid, from `sentence_on_loops`; only captions of loops contain it.
+    """
 
     def choose(found):
         return f"{found[2]} " if re.search(found[1], shown, re.MULTILINE) else ""
 
-    return _CONDITIONAL.sub(choose, _texts()[name].format_map(_texts())).strip()
+    return _CONDITIONAL.sub(choose, _texts()[name].format_map(_texts() | {"grid_of_loops": grid})).strip()
 
 
 def texts_of(figure: Figure, data: Mapping[str, object], studies: Sequence[str]) -> str:
@@ -69,6 +76,14 @@ def texts_of(figure: Figure, data: Mapping[str, object], studies: Sequence[str])
     truths = {node.attrs.get("truth") for node in compared if node.attrs.get("study") in studies}
     words += ["in the limit"] if SHORT_RANGE in truths else []
     return "\n".join(words + (["at finite range"] if FINITE_RANGE in truths else []))
+
+
+def sentence_on_loops(data: Mapping[str, object], studies: Sequence[str]) -> str:
+    """Return a sentence on the error of loops by boundary elements due to the grid; "" without such loops."""
+    from icha.analysis.grid_error import cells_of_loops, describe_loops
+
+    loops = cells_of_loops(data["campaign"], studies) if "campaign" in data else {}
+    return f"Grid: {describe_loops(loops)}." if loops else ""
 
 
 def count_runs(data: Mapping[str, object], studies: Sequence[str], shown: str = "") -> str:

@@ -29,6 +29,7 @@ from icha.figures.looks import (
     UNLOADING_MARKERS,
     legend_below,
     looks_of_studies,
+    pale,
     surface_label,
 )
 from icha.figures.style import GREY, format_number, in_style, legend_handle, new_panels, slope_label
@@ -135,7 +136,7 @@ def figure(
         pressure, gap = physical_units(campaign[study].to_dataset())
     drawn = []
     for (labels, run), contact in zip(runs, contacts, strict=True):
-        look = looks.look(contact, applicable=select.is_applicable(run))
+        look = looks.look(contact, applicable=select.is_good_loop(run), model=labels.model)
         beside = [truth for truth in truths if not difference_of_contacts(run, truth)]
         factors = 1.0, 1.0
         if units == "physical":
@@ -203,8 +204,10 @@ def _draw(ax, loop, names, *, turn):
     for truth in loop.truths:
         for branch, markers in _TRUTH_MARKERS.items():
             states = truth.isel(step=truth["branch"].values == branch)
-            marker = markers[_truth_name(truth)]
-            ax.plot(*(states[name] for name in names), color=colour, marker=marker, markevery=_APART, **_TRUTH)
+            look = {"color": colour, "marker": markers[_truth_name(truth)], **_TRUTH}
+            # The colour is already pale if the asperity model is not applicable.
+            look = look if select.is_good_loop(truth) or "label" in loop.look else pale(look, REFERENCE_MODEL)
+            ax.plot(*(states[name] for name in names), markevery=_APART, **look)
 
 
 def _curve(leg):

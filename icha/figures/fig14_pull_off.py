@@ -21,6 +21,7 @@ from icha.figures.looks import (
     legend_below,
     looks_of_studies,
     model_handle,
+    pale,
 )
 from icha.figures.select import names_of_models, select_detached_lines
 from icha.figures.style import GREY, ONE_COLUMN, TWO_COLUMNS, in_style, logarithmic_axes, new_panels
@@ -72,8 +73,8 @@ _Y = "pull_off_pressure"
 def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = ()) -> Figure:
     """Draw the pull-off pressure (mean over the seeds) against slope, and against the largest load of the path."""
     load_studies = list(dict.fromkeys(load_studies))
-    by_slope = select_detached_lines(campaign, [study], along_slopes=True, both_models=True)
-    by_load = select_detached_lines(campaign, load_studies, both_models=True)
+    by_slope = select_detached_lines(campaign, [study], quantity=_Y, along_slopes=True, both_models=True)
+    by_load = select_detached_lines(campaign, load_studies, quantity=_Y, both_models=True)
     points = list(itertools.chain(*by_slope.values(), *by_load.values()))
     if len({point.labels.rms_slope for point in points}) == 1:  # the same markers in both panels
         by_load = {((*contact[:2], None), *of): line for (contact, *of), line in by_load.items()}
@@ -87,9 +88,10 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
     for ax, x, drawn in zip(panels, ("rms_slope", "largest_reduced_pressure"), (by_slope, by_load), strict=False):
         lines = {key: Points(line, x, _Y, factor=factor) for key, line in drawn.items()}
         for position, ((contact, applicable, model), line) in enumerate(lines.items()):
-            look = looks.look(contact, applicable=applicable) | _LINE
+            look = looks.look(contact, applicable=applicable, model=model) | _LINE
             if len(models) > 1 and model == REFERENCE_MODEL:
                 look = cross_look(looks, contact, shape=_OBLIQUE) | _TRUTH
+                look = look if applicable else pale(look, model)
             look["ms"] *= _SMALLER
             line.draw(ax, look, shift=_SPREAD ** ((position + 0.5) / len(lines) - 0.5))
             counts += line.counts

@@ -13,7 +13,7 @@ from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.curves import cross_look
 from icha.figures.declaration import Campaign, Declaration, FigureOptions, problems_of_unloading
 from icha.figures.ensembles import Points, points_handles
-from icha.figures.looks import legend_below, looks_of_studies, model_handle
+from icha.figures.looks import legend_below, looks_of_studies, model_handle, pale
 from icha.figures.select import ContactRuns, NothingToDraw, names_of_models, select_detached_lines
 from icha.figures.style import GREY, in_style, logarithmic_axes, new_panels
 from icha.support.values import Problem, list_of_names
@@ -60,7 +60,7 @@ _SPAN = 30.0
 _LEAST_SHARE = 1e-6
 # Variables along x and y.
 _LOSS = ("largest_contact_area_fraction", "hysteresis_loss_over_surface_energy")
-# Opacity of the bars of runs for which the asperity model is not applicable.
+# Opacity of the bars of runs to which the model is not applicable.
 _PALE = 0.35
 
 
@@ -96,11 +96,12 @@ def _draw_losses(ax, runs, truths, looks):
     drawn = {key: Points(line, *_LOSS) for key, line in (runs | truths).items()}
     handles = looks.handles(ls="none") if looks.many else {}
     for key, line in drawn.items():
-        contact, applicable, _ = key
+        contact, applicable, model = key
         if key in truths:
-            line.draw(ax, cross_look(looks, contact))
+            look = cross_look(looks, contact)
+            line.draw(ax, look if applicable else pale(look, model))
             continue
-        handle = line.draw(ax, looks.look(contact, applicable=applicable) | {"ls": "none"})
+        handle = line.draw(ax, looks.look(contact, applicable=applicable, model=model) | {"ls": "none"})
         if not applicable:
             continue
         (x, y), words = line.means, ""
@@ -145,14 +146,14 @@ def _draw_parts(ax, runs, looks):
     """Draw the parts of the loss of every line as a stacked bar; return the names of the drawn parts."""
     bars = {key: shares(line) for key, line in runs.items()}
     shown = [name for name in PARTS if any(abs(bar[name]) >= _LEAST_SHARE for bar in bars.values())]
-    for position, ((contact, applicable, _), bar) in enumerate(bars.items()):
+    for position, ((contact, applicable, model), bar) in enumerate(bars.items()):
         above, below = 0.0, 0.0
         for name in shown:
             share = 100 * bar[name]
             bar_look = {"ec": "black", "lw": 0.4, "alpha": None if applicable else _PALE} | PARTS[name][1]
             ax.bar(position, share, 0.8, bottom=above if share > 0 else below, **bar_look)
             above, below = above + max(share, 0), below + min(share, 0)
-        look = looks.look(contact, applicable=applicable)
+        look = looks.look(contact, applicable=applicable, model=model)
         ax.plot(position, -0.055, transform=ax.get_xaxis_transform(), clip_on=False, **look | {"ls": "none"})
     ax.axhline(0, color="black", lw=0.6)
     ax.set(xlim=(-0.7, len(bars) - 0.3), ylabel="share of losses and gains (%)")

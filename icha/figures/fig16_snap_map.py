@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.contact.model import EVENT_KINDS
+from icha.contact.models import REFERENCE_MODEL
 from icha.datasets import results
 from icha.datasets.labels import RunLabels
 from icha.figures.curves import SEPARATION_LABEL
 from icha.figures.declaration import Campaign, Declaration, Inputs, RunFigure, UnloadedFigure
-from icha.figures.looks import BRANCH_DASHES, NOT_APPLICABLE_ALONE, legend_below
+from icha.figures.looks import BRANCH_DASHES, COARSE_GRID_ALONE, NOT_APPLICABLE_ALONE, legend_below
 from icha.figures.maps import topography_of
-from icha.figures.select import is_applicable, select_complete_run, unloading_legs
+from icha.figures.select import is_good_loop, select_complete_run, unloading_legs
 from icha.figures.style import BLACK, GREY, in_style, legend_handle, material_label, new_panels, slope_label
 
 if TYPE_CHECKING:
@@ -74,7 +75,10 @@ def figure(campaign: xr.DataTree, surface: xr.Dataset, *, run: Sequence) -> Figu
     title = f"{material_label(campaign[labels.study].to_dataset(), labels.material)}, {slope_label(labels.rms_slope)}"
     when.set_title(title, loc="right", fontsize="small")
     handles |= {name: legend_handle(color=GREY, ls=dashes, lw=1.1) for name, dashes in BRANCH_DASHES.items()}
-    legend_below(fig, handles if is_applicable(data) else handles | {NOT_APPLICABLE_ALONE: legend_handle(ls="none")})
+    if not is_good_loop(data):
+        words = COARSE_GRID_ALONE if labels.model == REFERENCE_MODEL else NOT_APPLICABLE_ALONE
+        handles |= {words: legend_handle(ls="none")}
+    legend_below(fig, handles)
     return fig
 
 

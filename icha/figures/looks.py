@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.contact.models import MODELS
+from icha.contact.models import DEFAULT_MODEL, MODELS, REFERENCE_MODEL
 from icha.datasets.labels import RunLabels, slopes_of
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
 from icha.figures.style import BLACK, COLOURS, GREY, INTERFACE, legend_handle, material_label, slope_label
@@ -61,6 +61,9 @@ _PALENESS = 0.4
 # Labels of runs for which the asperity model is not applicable: in figures of several runs, and in figures of one run.
 NOT_APPLICABLE = "pale: asperity model not applicable"
 NOT_APPLICABLE_ALONE = "asperity model not applicable"
+# The same for boundary elements.
+COARSE_GRID = "pale: grid too coarse for boundary elements"
+COARSE_GRID_ALONE = "grid too coarse for boundary elements"
 
 
 class Looks:
@@ -127,8 +130,8 @@ class Looks:
         """Return the colour of a material; black if the colours do not show this material."""
         return self._colours.get(material, BLACK)
 
-    def look(self, contact: Contact, *, applicable: bool = True) -> dict:
-        """Return arguments of `Axes.plot` for a line; colours are pale if the asperity model is not `applicable`."""
+    def look(self, contact: Contact, *, applicable: bool = True, model: str = DEFAULT_MODEL) -> dict:
+        """Return arguments of `Axes.plot` for a line; colours are pale if the `model` is not `applicable`."""
         material, *place = contact
         colour, size, adhesive = self.colour(contact), self._sizes[material], self.adhesive(material)
         look = {
@@ -143,7 +146,7 @@ class Looks:
         }
         if len(self.contacts) > FEW_LINES:
             look |= {"lw": 0.6, "ms": (0.6 if self.many else 0.8) * size}
-        return look if applicable else _pale(look)
+        return look if applicable else pale(look, model)
 
     def handles(self, **changed: object) -> dict[str, Line2D]:
         """Return the legend entries of materials, surfaces and slopes by name.
@@ -280,12 +283,13 @@ def material_colours(campaign: xr.DataTree) -> dict[str, str]:
     return dict(zip(dict.fromkeys(materials), itertools.cycle(MATERIAL_COLOURS)))
 
 
-def _pale(look):
-    """Return a look with open markers in a lighter colour, for runs to which the asperity model is not applicable."""
+def pale(look: dict, model: str) -> dict:
+    """Return a look with open markers in a lighter colour, for runs to which a model is not applicable."""
     from matplotlib.colors import to_hex, to_rgb
 
     colour = to_hex([1 - _PALENESS * (1 - part) for part in to_rgb(look["color"])])
-    return look | {"color": colour, "mec": colour, "mfc": "white", "label": NOT_APPLICABLE}
+    label = COARSE_GRID if model == REFERENCE_MODEL else NOT_APPLICABLE
+    return look | {"color": colour, "mec": colour, "mfc": "white", "label": label}
 
 
 def graded_colours(count: int, name: str = "viridis", brightest: float = 0.9) -> list[str]:
@@ -334,7 +338,9 @@ def legend_below(
     must therefore be added last.
     """
     marks = named_handles(figure.axes)
-    handles = dict(handles) | {name: marks[name] for name in (FEWER_SEEDS, NOT_APPLICABLE) if name in marks}
+    handles = dict(handles) | {
+        name: marks[name] for name in (FEWER_SEEDS, NOT_APPLICABLE, COARSE_GRID) if name in marks
+    }
     look = {"loc": "outside lower center", "fontsize": 8 if len(handles) <= _MANY_NAMES else 7}
     most, names, entries = _MOST_COLUMNS if handles else 0, list(handles), list(handles.values())
     if rows and (needed := -(-len(names) // rows)) <= _MOST_COLUMNS:

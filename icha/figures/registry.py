@@ -15,7 +15,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import icha.figures
-from icha.figures.captions import caption_of, count_runs, texts_of
+from icha.figures.captions import caption_of, count_runs, sentence_on_loops, texts_of
 from icha.figures.declaration import Declaration
 from icha.figures.own_figure import caption_in
 from icha.figures.style import GREY, in_style, new_figure, save
@@ -81,7 +81,10 @@ def draw_figure(
     try:
         figure = figure_module(name).figure(**data, **arguments)
         shown = texts_of(figure, data, studies)
-        caption = caption_in(data["script"]) if "script" in data else caption_of(name, shown)
+        if "script" in data:
+            caption = caption_in(data["script"])
+        else:
+            caption = caption_of(name, shown, sentence_on_loops(data, studies))
     except NothingToDraw as reason:
         caption = f"Nothing to draw: {reason}."
         print(caption)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -24,14 +24,14 @@ class NothingToDraw(ValueError):
 class ContactRuns(NamedTuple):
     """The complete runs of one model, material, surface and rms slope: one run for each seed.
 
-    Runs for which the asperity model is not applicable form a separate group.
+    Runs to which the model is not applicable form a separate group, and loops that the grid does not resolve.
 
     Attributes
     ----------
     labels : labels of the first run.
     by_seed : the runs, by seed.
     asked : number of seeds that the study requests.
-    applicable : True if the asperity model is applicable to the runs.
+    applicable : False if the runs are drawn pale.
     """
 
     labels: RunLabels
@@ -50,11 +50,15 @@ class ContactRuns(NamedTuple):
         return float(next(iter(self.by_seed.values()))["surface_energy"])
 
 
-def group_by_contact(campaign: xr.DataTree, runs: Iterable[tuple[RunLabels, xr.Dataset]]) -> list[ContactRuns]:
-    """Group runs that differ only in their seed."""
+def group_by_contact(
+    campaign: xr.DataTree,
+    runs: Iterable[tuple[RunLabels, xr.Dataset]],
+    applicable: Callable[[xr.Dataset], bool] | None = None,
+) -> list[ContactRuns]:
+    """Group runs that differ only in their seed; `applicable` is a function of a run, `is_applicable` by default."""
     found: dict[tuple, ContactRuns] = {}
     for labels, run in runs:
-        key = labels._replace(seed=None), is_applicable(run)
+        key = labels._replace(seed=None), (applicable or is_applicable)(run)
         if key not in found:
             asked = asked_seeds(campaign[labels.study].to_dataset(), labels)
             found[key] = ContactRuns(labels, {}, asked, key[1])
@@ -107,6 +111,15 @@ def asked_seeds(study: xr.Dataset, labels: RunLabels) -> int:
 def is_applicable(run: xr.Dataset) -> bool:
     """Return False if a run states a reason why the asperity model is not applicable, otherwise True."""
     return not run.attrs.get("applicability")
+
+
+def is_good_loop(run: xr.Dataset, variable: str = "hysteresis_loss") -> bool:
+    """Return False if a model is not applicable to a run that unloads, or its grid too coarse for pull-off or loss."""
+    from icha.analysis.grid_error import LOOP_ERRORS, cells_of_length
+
+    least = LOOP_ERRORS[variable].least_cells
+    coarse = run.attrs.get("contact_model") == REFERENCE_MODEL and cells_of_length(run) < least
+    return is_applicable(run) and not coarse
 
 
 def shown_model(study: xr.Dataset) -> str:
@@ -312,8 +325,8 @@ def select_detached_lines(
 
     Returns
     -------
-    For each line, the runs at every point. A key has three parts: a tuple of material, surface and slope; True if the
-    asperity model is applicable; and the name of the model.
+    For each line, the runs at every point. A key has three parts: a tuple of material, surface and slope; the result of
+    `is_good_loop`; and the name of the model.
 
     Raises
     ------
@@ -326,10 +339,10 @@ def select_detached_lines(
 
     found = {}
     for study in studies:
-        points = group_by_contact(campaign, _select_runs_with(has_quantity, campaign, study))
-        if both_models and points and points[0].labels.model != REFERENCE_MODEL:
-            points += group_by_contact(campaign, _select_runs_with(has_quantity, campaign, study, [REFERENCE_MODEL]))
-        for point in points:
+        runs = _select_runs_with(has_quantity, campaign, study)
+        if both_models and runs and runs[0][0].model != REFERENCE_MODEL:
+            runs += _select_runs_with(has_quantity, campaign, study, [REFERENCE_MODEL])
+        for point in group_by_contact(campaign, runs, lambda run: is_good_loop(run, quantity)):
             material, surface, slope = point.contact
             line = (material, surface, None if along_slopes else slope), point.applicable, point.labels.model
             found.setdefault(line, []).append(point)

@@ -3,6 +3,7 @@
 import math
 from functools import cache
 
+from icha.analysis.grid_error import length_in_cells
 from icha.analysis.validity import (
     COMPLETE,
     RESOLVED,
@@ -99,7 +100,7 @@ def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
 def expected_validity(campaign: Campaign) -> list[Statement]:
     """Return statements about the expected validity of the models; Tabor parameters are those of the mean summit."""
     facts_of = cache(lambda surface: surface_facts(campaign, surface))
-    cases, tabor, sticky = [], {}, {}
+    cases, tabor, sticky, loops = [], {}, {}, {}
     for case in run_cases(campaign):
         if is_derived_study(case.study, campaign.studies):
             continue  # runs whose error the estimates correct
@@ -132,6 +133,10 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
             spacing = campaign.period(case.surface) / campaign.grid(case.surface)
             tension = Front(material.adhesion_length / spacing).straight_strength * material.contact_modulus
             known |= {RESOLVED: tension, SPACING: spacing}
+            if campaign.studies[case.study].unload and material.surface_energy > 0 and not section.shape:
+                lengths = material.surface_energy, material.contact_modulus, rms_curvature(campaign, case), spacing
+                key = case.material, case.surface
+                loops[key] = min(float(length_in_cells(*lengths)), loops.get(key, math.inf))
         cases.append(Case(case.model, case.surface, case.material, known, campaign.resolution(case.surface)))
         if by_summits and material.surface_energy > 0:
             curvature = rms_curvature(campaign, case)
@@ -144,7 +149,7 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
         name: study.models for name, study in campaign.studies.items() if not is_derived_study(name, campaign.studies)
     }
     outside = _describe_outside(tabor) if tabor else None
-    stated = statements(models, cases, outside, describe_sticky(sticky))
+    stated = statements(models, cases, outside, describe_sticky(sticky), loops)
     return [*stated, *_default_ranges(campaign), *_indenters(campaign)]
 
 

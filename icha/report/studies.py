@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 from markupsafe import Markup
 
+from icha.analysis.grid_error import describe_grid
 from icha.analysis.left_out import AVERAGED_APART, ENDED_EARLY, causes_of_runs, find_left_out, left_out_of_study
 from icha.checks.findings import IDENTITY_LIMIT
 from icha.datasets.campaign import loading_stops, reduced_gap, run_place, runs_of_status, select_run
@@ -72,6 +73,7 @@ def summarise_study(campaign: xr.DataTree, name: str) -> dict:
         "table": _table(runs),
         "means": _means(dataset, complete),
         "loops": _loops(small, dataset, complete),
+        "grid": describe_grid(campaign, [name]),
     }
 
 

@@ -7,9 +7,11 @@ functions replace such characters by Python escapes, such as `\x1b` and `\u202e`
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from html import escape
 
+# Largest number of texts that a list names.
+_MOST_NAMES = 4
 _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 _CONTROLS = r"\x00-\x08\x0b-\x1f\x7f-\x9f"
 # Invisible marks, characters that change the writing direction, line separators, surrogates and tags. The joiners
@@ -24,6 +26,13 @@ _IN_A_LINE = re.compile(f"[\t\n{_CONTROLS}{_UNSEEN}]")
 def format_count(number: int, thing: str) -> str:
     """Format a number with a noun in singular or plural, such as `1 run` or `3 runs`."""
     return f"{number} {thing}{'' if number == 1 else 's'}"
+
+
+def join_first(cases: Iterable[str], between: str = ", ") -> str:
+    """Join the first texts of a list to one text, and append how many more texts there are."""
+    cases = list(cases)
+    more = len(cases) - _MOST_NAMES
+    return between.join(cases[:_MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
 
 
 def share(count: int, total: int) -> str:

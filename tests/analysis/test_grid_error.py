@@ -1,0 +1,124 @@
+"""Errors of boundary elements due to the grid: laws from the measurements, and words where numbers stand."""
+
+import itertools
+import math
+
+import cyclic_campaign as cyclic
+import numpy as np
+import pytest
+import small_campaign as small
+from drawn import legend
+
+import icha
+from icha.analysis.answers import answers_of, as_latex
+from icha.analysis.estimates import estimate_campaign
+from icha.analysis.grid_error import (
+    AREA_ERROR,
+    LOOP_ERRORS,
+    cells_of_length,
+    describe_lightest_state,
+    describe_loops,
+    error_beyond,
+)
+from icha.analysis.validity import statements_on_dataset
+from icha.datasets.campaign import campaign_tree
+from icha.datasets.labels import RunLabels
+from icha.figures import fig13_loops, fig14_pull_off, fig15_loss
+from icha.figures.captions import caption_of, sentence_on_loops
+from icha.figures.looks import COARSE_GRID
+from validation import loop_grid
+
+LABELS = RunLabels("pull", "boundary_elements", "rough", 1, 1.0, "soft")
+QUANTITIES = ("pull_off_pressure", "hysteresis_loss")
+
+
+def loops(cells, seeds=(1, 2)):
+    """Loops of boundary elements whose length has a number of cells."""
+    runs = {seed: cyclic.unloaded(small.run(seed=seed, material="soft")) for seed in seeds}
+    found = []
+    for seed, run in runs.items():
+        curvature = run["rms_curvature"] * float(cells_of_length(run) / cells) ** 1.5
+        run = run.assign(resolved_tension=1.0, rms_curvature=curvature.assign_attrs(run["rms_curvature"].attrs))
+        found.append((LABELS._replace(seed=seed), run.assign_attrs(contact_model=LABELS.model)))
+    return campaign_tree(found)
+
+
+@pytest.mark.parametrize("variable", QUANTITIES)
+def test_laws_of_loops_are_those_of_the_measurements(variable):
+    law = loop_grid.fit_loops(loop_grid.read_measurements(), variable)
+    known = LOOP_ERRORS[variable]
+    assert (known.width, known.power, known.scatter) == pytest.approx((law.width, law.power, law.scatter), rel=0.01)
+
+
+def test_law_of_areas_is_that_of_the_measurements():
+    rows = loop_grid.areas_of(loop_grid.read_measurements())
+    assert AREA_ERROR == pytest.approx(loop_grid.fit_areas(rows), rel=0.01)
+    # Four of five errors at least are within two standard deviations.
+    assert np.mean(np.abs(rows[:, 2]) < 2 * AREA_ERROR.at(rows[:, 1])) > 0.8
+
+
+@pytest.mark.parametrize("law", LOOP_ERRORS.values())
+def test_errors_of_loops_fall_with_the_cells(law):
+    errors = [law.at(cells) for cells in np.geomspace(0.3, 30, 20)]
+    assert all(0 < fine < coarse < 1 for coarse, fine in itertools.pairwise(errors))
+    assert law.at(law.least_cells) == pytest.approx(0.2)
+
+
+def test_length_of_a_summit_in_cells():
+    spectrum = icha.SelfAffineSpectrum(100e-6, 50e-6, 12.5e-6, 0.8, 0.1)
+    surface, material = spectrum.realise(64, 1), icha.Material(25e6, 0.02, 1e-8)
+    run = icha.simulate(surface, material, icha.Path(reduced_pressures=[1e-3]), model="boundary_elements")
+    length = (0.02 / 25e6 * surface.summit_radius**2) ** (1 / 3)
+    assert float(cells_of_length(run)) == pytest.approx(length / surface.spacing)
+    assert math.isnan(cells_of_length(run.assign(surface_energy=0.0)))
+
+
+def test_loops_on_a_coarse_grid_are_named_and_pale():
+    coarse, fine = loops(0.7), loops(2 * LOOP_ERRORS["hysteresis_loss"].least_cells)
+    stated = {each.about: each for each in statements_on_dataset(coarse) if each.about == "loops"}
+    text = stated["loops"].text
+    assert (
+        not stated["loops"].good and "0.7 cells for soft on rough (pull-off " in text and " % too small, loss " in text
+    )
+    for module in (fig13_loops, fig14_pull_off, fig15_loss):
+        options = {"studies": ["pull"]} if module is fig15_loss else {"study": "pull"}
+        assert COARSE_GRID in legend(module.figure(coarse, **options))
+        assert COARSE_GRID not in legend(module.figure(fine, **options))
+    for name in ("fig13_loops", "fig14_pull_off", "fig15_loss", "fig16_snap_map"):
+        assert "0.7 cells for soft on rough" in caption_of(name, "", sentence_on_loops({"campaign": coarse}, ["pull"]))
+    assert {each.about: each.good for each in statements_on_dataset(fine)}["loops"]
+
+
+def test_coarsest_loops_are_named_first():
+    text = describe_loops({("soft", "rough"): 3.0, ("hard", "rough"): 0.5})
+    assert text.index("0.5 cells for hard on rough") < text.index("3 cells for soft on rough")
+    assert "hard on rough (pull-off of unknown error, loss of unknown error)" in text
+
+
+def test_estimates_of_loops_say_that_the_error_of_the_grid_is_not_known():
+    tree = estimate_campaign(loops(0.7))
+    rows = [each for each in answers_of(tree["pull"].to_dataset()) if not each.state]
+    assert {each.quantity for each in rows} == {"pull-off tension", "loss of a loop"}
+    for each in rows:
+        assert "; on this grid, whose error is not known; with 0.7 cells" in each.number
+        assert any(each.quantity in line and "whose error is not known" in line for line in as_latex(tree))
+
+
+def test_estimates_are_silent_only_if_the_interval_contains_the_expected_error():
+    expected = LOOP_ERRORS["hysteresis_loss"].at(2.0)
+    for known, silent in ((1.01 * expected, True), (0.99 * expected, False), (math.nan, False)):
+        assert (error_beyond(known, "hysteresis_loss", 2.0, math.nan, math.nan) == "") == silent
+    assert error_beyond(math.nan, "pull_off_pressure", math.nan, math.nan, math.nan).endswith("error is not known")
+    assert "4 contact patches of 10 cells" in error_beyond(math.nan, "contact_area_fraction", math.nan, 4, 40)
+    assert error_beyond(math.nan, "mean_gap", math.nan, 4, 40) == ""
+
+
+def test_lightest_state_has_the_fewest_cells():
+    tree = loops(0.7)
+    run = small.run(seed=1, material="soft")
+    cells = [
+        float(small.run(seed=seed, material="soft")["contact_area_fraction"][0] * run["grid"] ** 2) for seed in (1, 2)
+    ]
+    text = describe_lightest_state(tree, ["pull"])
+    patches = int(small.run(seed=1 + int(np.argmin(cells)), material="soft")["spot_count"][0])
+    assert f"areas of {patches} contact patch" in text and f" of {min(cells) / patches:.0f} cells" in text
