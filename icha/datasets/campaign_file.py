@@ -341,7 +341,7 @@ def _put_shared(name: str, column: Column, known: np.ndarray, index: tuple, valu
     """Store the values of a variable that is the same for several runs; raise ValueError if an earlier run differs."""
     present = known[index]
     unknown = present == column.fill
-    equal = present == values if values.dtype.kind == "S" else abs(present - values) <= _SAME * abs(values)
+    equal = present == values if values.dtype.kind == "S" else np.isclose(present, values, rtol=_SAME, atol=0)
     if not np.all(unknown | equal):
         shared = ", ".join(column.along) or "the study"
         raise ValueError(f"{run}: {name} differs between runs that share {shared}; expected equal values")

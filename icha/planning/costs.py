@@ -214,8 +214,8 @@ def run_cost(
     memory = _memory_before(grid) + 9 * MiB * (1 + bool(legs))
     memory += size.arrays * _DOUBLE * nodes + size.summit * summits
     values = 20e3 + 57 * most * max(snapshots, 1) + 160 * steps + 20e3 * bool(legs)
-    # Names and attributes in a file take 40 kB.
-    return Cost(seconds, memory, 40e3 + values + size.maps * nodes * snapshots, values)
+    # Names and attributes in a file take 53 kB.
+    return Cost(seconds, memory, 53e3 + values + size.maps * nodes * snapshots, values)
 
 
 def finite_range_cost(nodes: int, *, adhesive: bool, **quantity: float) -> Cost:

@@ -72,7 +72,8 @@ def read_tables(
             if coordinate:
                 words.pop()
             if not long_name:
-                table[key] = known[key]._replace(dims=dims, coordinate=coordinate)
+                further = attributes.get(key, known[key].further)
+                table[key] = known[key]._replace(dims=dims, further=further, coordinate=coordinate)
                 continue
             dtype = _TYPES[words.pop()] if words[-1] in _TYPES else float
             further = attributes.get(key, {})
