@@ -19,7 +19,6 @@ from icha.asperity.material import WU_HOLDS_FROM
 from icha.asperity.tabor import SHORT_RANGE_FROM, describe_short_range
 from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets.attributes import reasons_not_applicable
-from icha.datasets.campaign import loading_stops
 from icha.datasets.labels import LABELS, is_derived_study
 from icha.datasets.variables.campaign import COMPUTED_RUNS
 from icha.path.targets import MAX_AREA_FRACTION, largest_area_fraction
@@ -366,6 +365,8 @@ def _smallest_radii(study):
     """Return the smallest contact radius of each run at a target of the first loading, m; None without a shape."""
     if "shape" not in study:
         return None
+    from icha.datasets.campaign import loading_stops  # imports xarray, which takes time
+
     area = study["contact_area_fraction"].where(loading_stops(study) & (study["contact_area_fraction"] > 0))
     radius = study["period"] * np.sqrt(area.min("step") / np.pi)
     return radius.fillna(np.inf).transpose(*LABELS).values

@@ -174,8 +174,6 @@ def _default_ranges(campaign):
 
 def _indenters(campaign):
     """Yield a statement for each shape and material: the contact of the smooth shape by theory, beside the square."""
-    from icha.references.indentation import contact_radius_at, pull_off_force, theory_of
-
     largest, layers = {}, {}
     for study, surface, name in dict.fromkeys(
         (case.study, case.surface, case.material) for case in run_cases(campaign)
@@ -183,6 +181,10 @@ def _indenters(campaign):
         if campaign.surfaces[surface].shape and not is_derived_study(study, campaign.studies):
             radii = campaign.contact_radii(campaign.studies[study], surface, name).values()
             largest[surface, name] = max(0.0, *radii, largest.get((surface, name), 0.0))
+    if not largest:
+        return
+    from icha.references.indentation import contact_radius_at, pull_off_force, theory_of  # imports SciPy
+
     for (surface, name), radius in largest.items():
         shape, material = campaign.surfaces[surface].shape.shape, campaign.materials[name]
         side, energy = campaign.period(surface), material.surface_energy

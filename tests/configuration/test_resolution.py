@@ -101,7 +101,7 @@ def test_waves_of_shapes(load, refused):
     ("shape", "targets", "cells"),
     [
         ({"sphere": {"radius": "1 mm"}}, {"indentations": ["0.4 um", "2 um"]}, "3.2"),
-        ({"cone": {"half_angle": "80 deg"}}, {"forces": ["1 mN", "1 N"]}, "1.92"),
+        ({"cone": {"half_angle": "80 deg"}}, {"forces": ["1 mN", "5 mN"]}, "1.92"),
         ({"cylinder_punch": {"radius": "20 um"}}, {"forces": ["1 mN"]}, "3.2"),
         ({"sphere": {"radius": "1 mm"}}, {"contact_radii": ["10 um", "40 um"]}, "1.6"),
     ],
