@@ -170,10 +170,9 @@ def configuration_of(monkeypatch):
     return read
 
 
-def test_wrong_values_on_the_command_line_are_messages_and_unwise_ones_warnings(configuration_of, tmp_path):
+def test_wrong_values_on_the_command_line_are_messages_and_confirmed_ones_warnings(configuration_of):
     with pytest.raises(SystemExit, match=r"with --config: name: 'My Campaign'(.|\n)*studies.none.targets:"):
         configuration_of(SMOKE, name="My Campaign", studies={"none": {}})
     with pytest.raises(SystemExit, match="expected one file"):
         configuration_of("config/config.yaml", SMOKE)
-    (tmp_path / "coarse.yaml").write_text((REPOSITORY / SMOKE).read_text().replace("grid: 64", "grid: 32", 1))
-    assert configuration_of(tmp_path / "coarse.yaml").startswith("Warning: surfaces.challenge.grid: 32")
+    assert "materials.cmc_300nm.interaction_range: '300 nm' is unusual" in configuration_of(SMOKE)
