@@ -23,6 +23,7 @@ PRIOR_SECONDS = 5.0
 # Expected core-seconds of a job that the plan does not list. Jobs outside the plan only write a few lines.
 DEFAULT_SECONDS = 0.1
 MOST_JOBS = 8  # largest number of running jobs that the view lists
+SILENCE = 45.0  # seconds without a line, outside a terminal, after which the view prints the running jobs
 MOST_ERROR_LINES = 3  # largest number of lines that the view prints for the error of a failed job
 
 
@@ -199,7 +200,7 @@ class View:
     def __init__(self, progress: Progress, campaign: str, folder: Path, console: Console):
         """Store the arguments; the context manager `live` draws the table in a terminal."""
         self._progress, self._campaign, self.folder, self._console = progress, campaign, folder, console
-        self._is_live = console.is_terminal
+        self._is_live, self._printed = console.is_terminal, progress.clock()
         self.live = nullcontext()
         if self._is_live:
             self.live = Live(get_renderable=self._draw, console=console, refresh_per_second=4, transient=True)
@@ -207,6 +208,17 @@ class View:
     def print(self, text: str, style: str = "") -> None:
         """Print a line of text; if the view shows a table, the line appears above the table."""
         self._console.print(Text(printable(text), style=style), soft_wrap=True)
+        self._printed = self._progress.clock()
+
+    def print_running(self) -> None:
+        """Print the running jobs if nothing was printed for `SILENCE` seconds; a terminal always shows these jobs."""
+        progress = self._progress
+        if self._is_live or progress.started is None or progress.clock() - self._printed < SILENCE:
+            return
+        with progress.lock:
+            lines = [self._heading(), *self._running()]
+        for line in lines:
+            self.print(line.plain)
 
     def print_job(self, job: JobRecord, failed: bool) -> None:
         """Print a finished job and the number of finished jobs; in a terminal, print only failed jobs."""

@@ -313,6 +313,7 @@ def _run_snakemake(command: list[str], workflow: Path, log: Path, progress, view
             while status is None:
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     status = process.wait(timeout=_REPEAT_STOP)
+                view.print_running()
                 if status is None and stopped:
                     # Snakemake can miss a signal that arrives while Snakemake starts a job.
                     os.killpg(process.pid, stopped[-1])

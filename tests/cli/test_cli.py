@@ -610,6 +610,20 @@ def test_the_live_view_shows_jobs_and_the_last_lines_of_their_logs(progress, tmp
     assert "half a li" not in text
 
 
+def test_without_a_terminal_running_jobs_are_printed_once_a_minute(progress, tmp_path):
+    from rich.console import Console
+
+    (tmp_path / "0.log").write_text("stop 1 of 2\n")
+    progress.update(started(0, log=["0.log"]))
+    console = Console(width=100, record=True)
+    view = View(progress, "tiny", tmp_path, console)
+    for now in range(0, 180, 15):  # as often as the run looks whether Snakemake has ended
+        progress.clock.now = now
+        view.print_running()
+    text = console.export_text()
+    assert text.count("tiny: 0 of 4 jobs") == text.count("Sweep 0") == text.count("stop 1 of 2") == 3
+
+
 def test_reasons_of_failures_are_in_logs(progress, tmp_path):
     progress.update(started(0, log=["0.log"]))
     job = progress.update({"event": "job_error", "jobid": 0})
