@@ -30,7 +30,10 @@ def new(
         bool, typer.Option("--boundary-elements", help="Add runs with boundary elements.")
     ] = False,
     indenter: Annotated[
-        bool, typer.Option("--indenter", help="Press a sphere, smooth and rough, into a soft body and pull it off.")
+        bool,
+        typer.Option(
+            "--indenter", help="Press a sphere, smooth and rough or with a measured surface, into a soft body."
+        ),
     ] = False,
 ) -> None:
     """Write the commented file of a new campaign, config/campaigns/NAME.yaml, and print the next commands.
@@ -38,7 +41,7 @@ def new(
     The campaign runs without changes. For a measured topography, fill in the keys that the command lists. The command
     also prints the number of summits of the topography, whether its spectrum ends in noise, and recommended keys.
     """
-    from jinja2 import Template
+    from jinja2 import Environment, FileSystemLoader
 
     from icha.support.values import NAME_PATTERN
 
@@ -51,19 +54,23 @@ def new(
         raise UserError(f"{name} is the campaign of {shorten_path(list_campaigns()[name])}; choose another name")
     if data is not None and measured is None:
         raise UserError("--data needs a measured file; use it with --measured FILE")
-    if indenter and (measured or pull_off or boundary_elements):
-        raise UserError("--indenter cannot be combined with other options; expected --indenter alone")
+    if indenter and (pull_off or boundary_elements):
+        raise UserError("--indenter includes boundary elements and pull-off; remove --pull-off and --boundary-elements")
     if measured is not None:
         for line in show_first_lines(measured):
             echo(line)
     section = None if measured is None else read_measured_section(measured, data, file.parent)
-    file_of_template = TEMPLATES / ("indenter.yaml" if indenter else "campaign.yaml")
-    template = Template(file_of_template.read_text(encoding="utf-8"), trim_blocks=True, keep_trailing_newline=True)
-    text = template.render(
+    if section is not None and indenter:
+        section["to_fill_in"].pop("boundary")
+        section["to_fill_in"]["shape.sphere.radius"] = "the radius of the indenter"
+    # Autoescape is for HTML; this file is YAML.
+    templates = Environment(loader=FileSystemLoader(TEMPLATES), trim_blocks=True, keep_trailing_newline=True)
+    text = templates.get_template("indenter.yaml" if indenter else "campaign.yaml").render(
         name=name,
         schema=Path(os.path.relpath(_schema(), file.parent)).as_posix(),
         readme=README.as_posix(),
         scan=section,
+        indenter=indenter,
         pull_off=pull_off,
         boundary_elements=boundary_elements,
     )

@@ -32,6 +32,7 @@ from icha.planning.plan import CHANGED, DAMAGED, DONE, FAILED, TO_DO, early_ends
 from icha.references.theories import reference_dataset
 from icha.support.checksums import damaged, write_checksum
 from icha.support.formatting import format_quantity
+from icha.surfaces.shapes import Sphere
 from icha.surfaces.spectrum import SelfAffineSpectrum
 
 HEAVY = ["scipy", "pandas", "xarray", "matplotlib", "netCDF4", "snakemake"]
@@ -145,6 +146,18 @@ def test_a_new_campaign_is_valid(project, options):
     schema = file.parent / first.removeprefix("# yaml-language-server: $schema=")
     assert json.loads(schema.read_text())["$schema"]
     assert time_on(plan(campaign, project / "results/mine"), 2) < 60
+
+
+def test_a_measured_surface_on_an_indenter_needs_only_the_radius(project):
+    write_scan("scan.txt", rough_heights(), "10 um")
+    written = printed("new", "lens", "--measured", "scan.txt", "--indenter")
+    assert written.count("to fill in: ") == 1 and "surfaces.scan.shape.sphere.radius (the radius" in written
+    assert "surfaces.scan.shape.sphere.radius: (empty)" in printed("describe", "lens", status=2)
+    file = CAMPAIGNS / "lens.yaml"
+    text = file.read_text().replace("{radius: }", "{radius: 10 um}").replace("1 um, 3 um", "1 nm")
+    file.write_text(text.replace("50 mJ/m^2", "0.5 mJ/m^2"))
+    surface = load_configuration(file).campaign.surfaces["scan"]
+    assert surface.boundary == "free" and surface.detrend == "curvature" and surface.shape.shape == Sphere(10e-6)
 
 
 def test_the_examples_in_the_comments_of_a_new_campaign_are_valid(project):
