@@ -176,3 +176,12 @@ def test_wrong_values_on_the_command_line_are_messages_and_confirmed_ones_warnin
     with pytest.raises(SystemExit, match="expected one file"):
         configuration_of("config/config.yaml", SMOKE)
     assert "materials.cmc_300nm.interaction_range: '300 nm' is unusual" in configuration_of(SMOKE)
+
+
+def test_the_report_of_snakemake_contains_every_figure_with_its_caption(smoke, tmp_path):
+    done = snakemake(smoke, "--report", str(tmp_path / "report.html"))
+    assert done.returncode == 0, done.stdout
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    for figure in (smoke / "results/smoke/figures").glob("*.png"):
+        for kind in ("figure", "caption"):
+            assert json.dumps({"figure": figure.stem, "file": kind}) in page

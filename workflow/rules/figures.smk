@@ -33,9 +33,9 @@ rule figure:
     input:
         unpack(lambda wildcards: FIGURE_INPUTS[wildcards.name]),
     output:
-        png="<results>/figures/{name}.png",
+        png=report("<results>/figures/{name}.png", category="Figures", labels={"figure": "{name}", "file": "figure"}),
         pdf="<results>/figures/{name}.pdf",
-        text="<results>/figures/{name}.txt",
+        text=report("<results>/figures/{name}.txt", category="Figures", labels={"figure": "{name}", "file": "caption"}),
     log:
         "<logs>/figures/{name}.log",
     benchmark:
