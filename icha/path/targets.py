@@ -205,16 +205,16 @@ class Path:
     pressures : values of the nominal pressure F/A0 in Pa, increasing, in [-1e30, 1e30].
     forces : values of the normal force in N, increasing, in [-1e30, 1e30].
     indentations : values of -u in m, increasing, in [-1e9, 1e9]; negative before the undeformed surfaces meet.
-    contact_radii : values of sqrt(A/pi) in m, increasing, in [1e-24, 1e9]. Give exactly one of these seven lists. Loads
-        of zero and tensile (negative) loads need adhesion: the path meets them in contact, where the load first rises
-        to them during the first loading. If the jump into contact passes such a load, the path goes back to it.
+    contact_radii : values of sqrt(A/pi) in m, increasing, in [1e-24, 1e9]. Give exactly one of these seven lists. Zero
+        and tensile (negative) loads need adhesion: the path meets them in contact, where the load first rises to them
+        during the first loading. If the jump into contact passes such a load, the path goes back to it.
     snapshots : pairs (kind, value), in any order, of states of the first loading whose distributions and spots are
         saved. The kind is "reduced_pressure", "relative_load" (F/(E* A0)), "area_fraction", "mean_separation" (m),
         "pressure" (Pa), "force" (N), "indentation" (m) or "contact_radius" (m). A snapshot is an additional target
-        unless the list contains the same kind and value. A kind that begins with "unloading_", such as
-        "unloading_force", stands for a state of the last unloading; if the last unloading does not have this state,
-        there is a warning and no snapshot. Snapshots are in the dataset in the order in which the path reaches them.
-        Default: the last target of the list.
+        unless the list contains the same kind and value. With `unloading_` in front, such as "unloading_force", a kind
+        stands for a state of the last unloading; if the last unloading does not have this state, there is a warning
+        and no snapshot. Snapshots are in the dataset in the order in which the path reaches them. Default: the last
+        target of the list.
     turning_points : pairs (kind, value) at which the path turns after its last target: the first one ends unloading,
         the second one ends loading, and so on. The kinds are those of snapshots.
     unload : whether the path ends with complete separation. The last unloading meets again each target between its

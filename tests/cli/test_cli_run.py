@@ -72,7 +72,7 @@ def project(tmp_path_factory):
 def test_a_job_that_crashes_is_named_with_its_log_and_stops_no_other(project):
     script = project / "workflow/scripts/run_sweep.py"
     whole = script.read_text()
-    begin = "    contact = read_surface"
+    begin = "    contact = read_scaled_surface"
     assert whole.count(begin) == 1
     script.write_text(whole.replace(begin, CRASH + begin))
     try:

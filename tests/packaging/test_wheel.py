@@ -193,7 +193,7 @@ def test_new_and_shipped_campaigns_work_in_any_folder(workflow, tmp_path):
     made = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*") if path.is_file()}
     assert made == {"config/campaigns/mine.yaml", "config/config.schema.json", "config/README.md"}
     for name in ("mine", "smoke", "paper"):
-        assert call(workflow / "icha", "describe", name, cwd=tmp_path).startswith(f"{name}: ")
+        assert f"\n{name}: " in "\n" + call(workflow / "icha", "describe", name, cwd=tmp_path)
     said = call(workflow / "icha", "run", "smoke", "--dry-run", cwd=tmp_path)
     assert "jobs would run" in said and not (tmp_path / "results").exists()
 
