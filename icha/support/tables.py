@@ -1,14 +1,16 @@
-"""Read small tables from text files of users: spectra, and measurements."""
+"""Read text files of users: encoding, fields, and small tables of spectra and measurements."""
 
 from __future__ import annotations
 
 import codecs
 import csv
+import gzip
 import os
 import re
+import zlib
 from collections.abc import Collection, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 from icha.support.input_files import TooLarge, bounded_memory, problem_with_path
 from icha.support.rules import POSITIVE
@@ -17,16 +19,48 @@ if TYPE_CHECKING:
     import numpy as np
 
 # A number with three digits after a comma. The comma may be a decimal sign, or it may separate thousands.
-_AMBIGUOUS_COMMA = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")
+AMBIGUOUS_COMMA = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}(?!\d)")
 # A row of a table: the number of its line in the file, from 1, and its fields.
 Row = tuple[int, list[str]]
+
+
+def open_text(path: Path) -> TextIO:
+    """Open a text file, which may be compressed by gzip.
+
+    The encoding is UTF-16 if the text begins with its byte order mark, else UTF-8, or else Windows-1252.
+    """
+    with path.open("rb") as file:
+        compressed = file.read(2) == b"\x1f\x8b"
+    opener = gzip.open if compressed else open
+    with opener(path, "rb") as file:
+        start = file.read(2**16)
+    encoding = "utf-8-sig"
+    if start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        encoding = "utf-16"
+    else:
+        try:
+            # The last line is left out, because `start` may end within a character.
+            start[: start.rfind(b"\n") + 1].decode(encoding)
+        except UnicodeDecodeError:
+            encoding = "cp1252"
+    return opener(path, "rt", encoding=encoding, errors="replace")
+
+
+def split_fields(line: str, delimiter: str) -> list[str]:
+    """Split a line at blanks (delimiter " ") or at another delimiter into fields without quotes and outer blanks."""
+    if delimiter == " ":
+        fields = line.split()
+    elif '"' in line:
+        fields = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
+    else:
+        fields = line.split(delimiter)
+    return [field.strip(' "\t') for field in fields]
 
 
 def read_rows(path: str | os.PathLike) -> tuple[list[Row], list[str]]:
     """Read the rows of a table: one row in each line, with one number of fields in all rows.
 
-    Tabs, semicolons, commas or blanks separate the fields. The text is in UTF-8, in UTF-16 with a byte order mark, or
-    in Windows-1252. Empty lines and lines that begin with # do not count.
+    Tabs, semicolons, commas or blanks separate the fields. Empty lines and lines that begin with # do not count.
 
     Returns
     -------
@@ -40,10 +74,9 @@ def read_rows(path: str | os.PathLike) -> tuple[list[Row], list[str]]:
     if problem := problem_with_path(path):
         raise ValueError(f"{problem}; expected a text file with a table")
     try:
-        with bounded_memory():
-            content = Path(path).read_bytes()
-            lines = [line.strip(" \r\n\f\v\x1a") for line in _decode(content).split("\n")]
-    except (OSError, TooLarge) as error:
+        with bounded_memory(), open_text(Path(path)) as file:
+            lines = [line.strip(" \r\n\f\v\x1a") for line in file]
+    except (OSError, EOFError, zlib.error, TooLarge) as error:
         reason = getattr(error, "strerror", None) or error
         raise ValueError(f"cannot be read ({reason}); expected a text file with a table") from None
     if any("\0" in line for line in lines):
@@ -51,27 +84,12 @@ def read_rows(path: str | os.PathLike) -> tuple[list[Row], list[str]]:
     remarks = [line.lstrip("#").strip() for line in lines if line.startswith("#")]
     texts = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
     unquoted = [re.sub(r'"[^"]*"', "", line) for _, line in texts]
-    delimiter = next((sign for sign in "\t;," if 2 * sum(sign in line for line in unquoted) > len(texts)), None)
-    rows = [(number, _fields(line, delimiter)) for number, line in texts]
+    delimiter = next((sign for sign in "\t;," if 2 * sum(sign in line for line in unquoted) > len(texts)), " ")
+    rows = [(number, split_fields(line, delimiter)) for number, line in texts]
     # A delimiter at the end of every line does not add a column.
-    if delimiter and all(len(row) > 1 and not row[-1] for _, row in rows):
+    if delimiter != " " and all(len(row) > 1 and not row[-1] for _, row in rows):
         rows = [(number, row[:-1]) for number, row in rows]
     return rows, remarks
-
-
-def _decode(content):
-    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        return content.decode("utf-16", "replace")
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return content.decode("cp1252", "replace")
-
-
-def _fields(line, delimiter):
-    if delimiter is None:
-        return line.split()
-    return [field.strip() for field in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))]
 
 
 def check_lengths(rows: list[Row], expected: int) -> None:
@@ -103,7 +121,7 @@ def positive_numbers(rows: list[Row], column: int, name: str) -> np.ndarray:
 
     fields = [row[column] for _, row in rows]
     with_comma = [field for field in fields if "," in field]
-    if with_comma and all(map(_AMBIGUOUS_COMMA.fullmatch, with_comma)):
+    if with_comma and all(map(AMBIGUOUS_COMMA.fullmatch, with_comma)):
         raise ValueError(
             f"has numbers such as {with_comma[0]} in column {name}, whose comma may be decimal or separate thousands; "
             "expected decimal points"

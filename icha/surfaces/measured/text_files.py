@@ -2,8 +2,6 @@
 
 import math
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.fft
@@ -11,6 +9,7 @@ import scipy.fft
 from icha.support import formatting
 from icha.support.input_files import require_room
 from icha.support.rules import GRID
+from icha.support.tables import AMBIGUOUS_COMMA
 from icha.surfaces.measured.array_files import is_instrument_text
 from icha.surfaces.measured.settings import (
     LINE_SCAN,
@@ -21,7 +20,7 @@ from icha.surfaces.measured.settings import (
     metres_of,
     put_y_first,
 )
-from icha.surfaces.measured.text_tables import AMBIGUOUS_COMMA, Layout, SourceFile, refuse_coordinates, strip_remark
+from icha.surfaces.measured.text_tables import Layout, SourceFile, refuse_coordinates, strip_remark
 
 # Fewest columns of a table with a row of heights in every line.
 _FEWEST_COLUMNS = 8
@@ -38,17 +37,6 @@ _SQUARE = 1e-2
 _BYTES_OF_NODE = 64
 # Opposite waves count as conjugate if the error, divided by the largest amplitude, is at most this value.
 _CONJUGATE = 1e-4
-# Labels that Gwyddion writes in the languages of its menus (msgid Width, Height, Value units and Lateral units in the
-# files po/*.po of Gwyddion).
-_GWYDDION = {
-    "width": "Width|Šířka|Breite|Anchura|Largeur|Larghezza|幅|폭|Largura|Ширина",
-    "height": "Height|Výška|Höhe|Altura|Hauteur|Altezza|高さ|높이|Высота",
-    "value units": "Value units|Jednotky hodnot|Einheiten|Unités|unità valore|値の単位|값 단위|Unidades de valor"
-    "|Единицы измерения",
-    "lateral units": "Lateral units|Jednotky rozměrů|_?Laterale Einheiten|Unités latérales|Unità laterali"
-    "|Единицы горизонтальных размеров",
-}
-_LABELS = {label: re.compile(rf"#?\s*({words})\s*[:：]\s*(.*)", re.IGNORECASE) for label, words in _GWYDDION.items()}
 # Words in the headings of texts that SurfaceTopography reads: Wyko, SPIP, Attocube, Nova, interferometers, line scans.
 _INSTRUMENT = re.compile(
     r"Wyko ASCII|File Format\s*=\s*ASCII|x-unit|^\s*Scale X\s*=|height\s+conversion\s+factor"
@@ -59,40 +47,27 @@ _NUMBER = r"([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)"
 # One length or two, such as 12 µm x 12 µm.
 _LENGTHS = re.compile(rf"{_NUMBER}\s*(\S+?)?(?:\s*[x×*]\s*{_NUMBER}\s*(\S+)?)?$")
 # A line of the heading: a name, then a colon, an equals sign, a delimiter or blanks, then a value.
-_ENTRY = re.compile(r"^[#%/\s']*([A-Za-z][A-Za-z _./()-]*?)\s*(?:[:=,;\t]\s*|\s+(?=[-+]?\d))(.+?)[\s',;]*$")
-# Names of entries in a heading, in small letters and without punctuation; the last ones are Keyence's.
-_SIZES = ("size", "scan size", "scan range", "scan area", "field of view")
-_PIXELS = "pixel|pixel size|pixel spacing|point spacing|spacing|cell size|cellsize|xy calibration|xy justierung".split(
-    "|"
-)
-_HEIGHT_UNITS = ("z unit", "z units", "value unit", "value units", "height unit", "height units", "data unit")
-_UNITS = ("unit", "units", "einheit")
-_COUNTS = {
-    "rows": ("nrows", "rows", "lines", "number of rows", "number of lines", "vertical", "vertikal"),
-    "columns": ("ncols", "cols", "columns", "number of columns", "horizontal", "horizont"),
+_ENTRY = re.compile(r"^[#%/\s'_]*([^\W\d_](?:[^\W\d]|[ ./()-])*?)\s*(?:[:：=,;\t]\s*|\s+(?=[-+]?\d))(.+?)[\s',;]*$")
+# Meaning of the names in a heading, in small letters and without punctuation. The words of Gwyddion for width, height,
+# value units and lateral units are those of its languages (msgid in its files po/*.po).
+_NAMES = {
+    "width": "width|šířka|breite|anchura|largeur|larghezza|幅|폭|largura|ширина",
+    "height": "height|výška|höhe|altura|hauteur|altezza|高さ|높이|высота",
+    "value units": "value units|jednotky hodnot|einheiten|unités|unità valore|値の単位|값 단위|unidades de valor"
+    "|единицы измерения",
+    "lateral units": "lateral units|jednotky rozměrů|laterale einheiten|unités latérales|unità laterali"
+    "|единицы горизонтальных размеров",
+    "unit of heights": "z unit|z units|value unit|height unit|height units|data unit",
+    "unit": "unit|units|einheit",
+    "size": "size|scan size|scan range|scan area|field of view",
+    "pixel": "pixel|pixel size|pixel spacing|point spacing|spacing|cell size|cellsize|xy calibration|xy justierung",
+    "rows": "nrows|rows|lines|number of rows|number of lines|vertical|vertikal",
+    "columns": "ncols|cols|columns|number of columns|horizontal|horizont",
+    "missing": "nodata value|nodata|no data value|missing value|bad value|missing data value",
 }
-_MISSING = ("nodata value", "nodata", "no data value", "missing value", "bad value", "missing data value")
-# Numbers for a missing height in grids by ESRI, if the heading does not define another number, and by Surfer.
-_ESRI_MISSING, _SURFER_MISSING = -9999.0, "1.70141e+38"
-
-
-@dataclass(frozen=True)
-class _Heading:
-    """Units, size and missing heights from the heading of a text file; None for each value that is not in the heading.
-
-    Attributes
-    ----------
-    height_unit, lateral_unit : units of heights and of coordinates, m.
-    size : sides (along the rows, along the columns) of the table, m.
-    coordinates : sides of the table in an unknown unit.
-    missing : numbers that mark a missing height.
-    """
-
-    height_unit: float | None = None
-    lateral_unit: float | None = None
-    size: tuple[float, float] | None = None
-    coordinates: tuple[float, float] | None = None
-    missing: tuple[float, ...] = ()
+_MEANINGS = {name: meaning for meaning, names in _NAMES.items() for name in names.split("|")}
+# Number for a missing height in grids by ESRI, if the heading does not define another number.
+_ESRI_MISSING = -9999.0
 
 
 def format_of_text(file: SourceFile) -> str:
@@ -108,16 +83,16 @@ def format_of_text(file: SourceFile) -> str:
         any(map(strip_remark, layout.heading)) and is_instrument_text(file)
     ):
         return "instrument"
-    return "xyz" if 3 <= layout.columns < _FEWEST_COLUMNS and not _is_image(layout.heading) else "matrix"
+    return "xyz" if 3 <= layout.columns < _FEWEST_COLUMNS and not _Heading(layout).is_image else "matrix"
 
 
 def read_matrix(file: SourceFile, settings: Preparation) -> FileContent:
     """Read a text file with a row of heights in every line; units, size and missing heights come from its heading."""
-    heights, lines = file.values, file.table_layout.heading
-    if lines and lines[0].startswith("Zygo "):
+    heights, heading = file.values, _Heading(file.table_layout)
+    if "".join(heading.lines[:1]).startswith("Zygo "):
         raise UnfitTopography("path", "is a Zygo file without points x y z; expected another export, such as XYZ")
     file.refuse_blocks()
-    if not (_counts_agree(lines, heights.shape) or _is_image(lines)):
+    if not (heading.agrees_with(heights.shape) or heading.is_image):
         refuse_coordinates(heights)
         if file.ends_with_delimiters and len(heights) != len(heights.T):
             raise UnfitTopography(
@@ -125,12 +100,11 @@ def read_matrix(file: SourceFile, settings: Preparation) -> FileContent:
                 "has a delimiter at the end of every line; the last column may be missing heights, or no column. "
                 "Remove these delimiters, or write nan for missing heights",
             )
-    heading = _read_heading(file.table_layout, heights.shape, settings)
-    heights = _mark_missing(heights, heading)
-    size, coordinates = heading.size, heading.coordinates
+    size, coordinates = heading.find_size(heights.shape, settings)
     if settings.first_axis == "x":
         size, coordinates = size and size[::-1], coordinates and coordinates[::-1]
-    return FileContent(put_y_first(heights, settings), heading.height_unit, size, coordinates)
+    heights = put_y_first(heading.mark_missing(heights), settings)
+    return FileContent(heights, heading.find_height_unit(settings), size, coordinates)
 
 
 def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
@@ -166,15 +140,16 @@ def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
             f"{nx * ny - len(points)} points, so the edge of the scan is not known. Remove the lines, or add x and y",
         )
     require_room(2 * 8 * nx * ny)
-    heading = _read_heading(layout, points.shape, settings)
+    heading = _Heading(layout)
     heights = np.full(nx * ny, np.nan)
-    heights[node] = _mark_missing(points[:, 2], heading)
+    heights[node] = heading.mark_missing(points[:, 2])
     x_unit, y_unit, z_unit = (metres_of(titles[column - 1][1]) if titles else None for column in columns)
-    x_unit, y_unit = x_unit or heading.lateral_unit, y_unit or heading.lateral_unit
+    lateral_unit = heading.find_lateral_unit(settings)
+    x_unit, y_unit = x_unit or lateral_unit, y_unit or lateral_unit
     remark = "columns x {}, y {}, z {} by their names".format(*columns)
     return FileContent(
         heights.reshape(ny, nx),
-        z_unit or heading.height_unit,
+        z_unit or heading.find_height_unit(settings),
         (nx * dx * x_unit, ny * dy * y_unit) if x_unit and y_unit and settings.lateral_unit is None else None,
         (nx * dx, ny * dy),
         remark="; ".join(filter(None, (remark if titles and columns != sorted(columns) else "", scattered))),
@@ -251,49 +226,94 @@ def _find_columns(count, settings, layout, names):
     return [1, 2, 3]
 
 
-def _mark_missing(heights, heading):
-    """Replace numbers by nan if the heading defines them as missing heights."""
-    for number in heading.missing:
-        heights = np.where(np.isclose(heights, number, rtol=_FEW_DIGITS, atol=0), np.nan, heights)
-    return heights
+class _Heading:
+    """Units, size and missing heights in the lines above a table.
 
-
-def _read_heading(layout: Layout, shape: tuple[int, int], settings: Preparation) -> _Heading:
-    """Read units, size and missing heights from the heading of a table with the given shape (rows, columns).
-
-    Raises UnfitTopography if entries of the heading contradict each other, or the size has an ambiguous comma, and the
-    settings do not contain the value.
+    The methods raise UnfitTopography if entries of the heading contradict each other and the settings do not contain
+    the value.
     """
-    lines = layout.heading
-    entries = _entries(lines)
 
-    def values(names):
-        return [value for name in names for value, _ in entries.get(name, [])]
+    def __init__(self, layout: Layout):
+        """Find the entries of a heading: meaning of the name, value, and line."""
+        self.lines, self.decimal = layout.heading, layout.decimal
+        self.entries: list[tuple[str, str, str]] = []
+        names, previous = set(), ("", "")
+        for line in self.lines:
+            if not (found := _ENTRY.match(line.replace('"', ""))):
+                continue
+            name = re.sub(r"[\s_.-]+", " ", found[1].lower()).strip()
+            # A delimiter may stand between a number and its unit.
+            value = re.sub(r"(?<=\d)\s*[,;\t]\s*(?=[^\W\d])", " ", found[2])
+            meaning = _MEANINGS.get(name, name)
+            self.entries.append((meaning, value, line))
+            # The height of an image follows its width; elsewhere it may be a height of the surface.
+            if (previous[0], meaning) in (("width", "height"), ("dx", "dy")):
+                self.entries.append(("size" if meaning == "height" else "pixel", f"{previous[1]} x {value}", line))
+            previous = meaning, value
+            names.add(name)
+        self.is_grid = {"ncols", "nrows"} <= names
+        # The heading of an image that Gwyddion exported.
+        image = ["width", "height", "value units"]
+        self.is_image = image == [each for each, _, line in self.entries if line.startswith("#") and each in image]
 
-    rows, columns = shape
-    grid = {"ncols", "nrows"} <= entries.keys()
-    heading = _Heading(
-        height_unit=_agreed("height_unit", values(_HEIGHT_UNITS) or values(_UNITS), settings.height_unit),
-        lateral_unit=_agreed("lateral_unit", values(["lateral units"]), settings.lateral_unit)
-        or next((x for text in values(["distance of points"]) for x, _ in _lengths(text)), None),
-        missing=tuple(_number(found[1]) for found in map(_LENGTHS.match, values(_MISSING)) if found)
-        or ((_ESRI_MISSING,) if grid else ()),
-    )
-    texts = [(text, (1, 1)) for text in values(_SIZES)] + [(text, (columns, rows)) for text in values(_PIXELS)]
-    found = [(text, x * nx, y * ny) for text, (nx, ny) in texts for x, y in _lengths(text)]
-    if not found and grid and (steps := re.fullmatch(rf"{_NUMBER}(?: x {_NUMBER})?", texts[0][0] if texts else "")):
-        x, y = _number(steps[1]), _number(steps[2] or steps[1])
-        return replace(heading, coordinates=(x * columns, y * rows))
-    pixels = [(x / columns, y / rows) for _, x, y in found]
-    stated = ", ".join(text for text, _, _ in found)
-    problem = ""
-    if layout.decimal != "," and any(AMBIGUOUS_COMMA.match(text) for text, _, _ in found):
-        problem = f"is {stated!r} in the file; the comma may be decimal or separate thousands"
-    elif not (grid or _is_image(lines) or np.allclose(pixels, pixels[0][0] if pixels else 0, rtol=_SQUARE, atol=0)):
-        problem = f"is missing, and the lengths in the heading, {stated}, do not fit {columns} x {rows} square pixels"
-    if problem and settings.size is None:
-        raise UnfitTopography("size", f"{problem}. Give the size in this key")
-    return replace(heading, size=found[0][1:]) if found and not problem else heading
+    def values(self, *meanings: str) -> list[str]:
+        """Return the values of the entries with these meanings."""
+        return [value for meaning, value, _ in self.entries if meaning in meanings]
+
+    def agrees_with(self, shape: tuple[int, int]) -> bool:
+        """Return whether the heading states the rows and columns of a table; raise an error if it states others."""
+        counts, agreed = dict(zip(("rows", "columns"), shape, strict=True)), set()
+        for axis, value, line in self.entries:
+            if axis in counts and value.isdecimal():
+                if int(value) != counts[axis]:
+                    raise UnfitTopography(
+                        "path",
+                        f"has {counts[axis]} {axis} of numbers, but its heading states {value} in "
+                        f"{line.strip()[:40]!r}; expected a whole table. Export the table again, or correct or remove "
+                        "this line",
+                    )
+                agreed.add(axis)
+        return len(agreed) == 2
+
+    def find_height_unit(self, settings: Preparation) -> float | None:
+        """Return the unit of the heights, m; None without a unit."""
+        texts = self.values("value units", "unit of heights") or self.values("unit")
+        return _agreed("height_unit", texts, settings.height_unit)
+
+    def find_lateral_unit(self, settings: Preparation) -> float | None:
+        """Return the unit of the coordinates, m; None without a unit."""
+        steps = [x for text in self.values("distance of points") for x, _ in _lengths(text)]
+        return next(iter(steps), None) or _agreed("lateral_unit", self.values("lateral units"), settings.lateral_unit)
+
+    def mark_missing(self, heights: np.ndarray) -> np.ndarray:
+        """Replace numbers by nan if the heading defines them as missing heights."""
+        stated = [_number(found[1]) for found in map(_LENGTHS.match, self.values("missing")) if found]
+        for number in stated or [_ESRI_MISSING] * self.is_grid:
+            heights = np.where(np.isclose(heights, number, rtol=_FEW_DIGITS, atol=0), np.nan, heights)
+        return heights
+
+    def find_size(self, shape: tuple[int, int], settings: Preparation):
+        """Return the sides (along the rows, along the columns) of a table in m, and in an unknown unit, if stated."""
+        rows, columns = shape
+        texts = [(text, 1, 1) for text in self.values("size")]
+        texts += [(text, columns, rows) for text in self.values("pixel")]
+        found = [(text, x * nx, y * ny) for text, nx, ny in texts for x, y in _lengths(text)]
+        if not found:
+            steps = re.fullmatch(rf"{_NUMBER}(?: x {_NUMBER})?", texts[0][0]) if self.is_grid and texts else None
+            return None, steps and (_number(steps[1]) * columns, _number(steps[2] or steps[1]) * rows)
+        stated = ", ".join(text for text, _, _ in found)
+        pixels = [(x / columns, y / rows) for _, x, y in found]
+        if self.decimal != "," and any(AMBIGUOUS_COMMA.match(text) for text, _, _ in found):
+            problem = f"is {stated!r} in the file; the comma may be decimal or separate thousands"
+        elif self.is_grid or self.is_image or np.allclose(pixels, pixels[0][0], rtol=_SQUARE, atol=0):
+            return found[0][1:], None
+        else:
+            problem = (
+                f"is missing, and the lengths in the heading, {stated}, do not fit {columns} x {rows} square pixels"
+            )
+        if settings.size is None:
+            raise UnfitTopography("size", f"{problem}. Give the size in this key")
+        return None, None
 
 
 def _agreed(key, texts, given):
@@ -302,67 +322,6 @@ def _agreed(key, texts, given):
     if len(units) > 1 and given is None:
         raise UnfitTopography(key, f"is missing, and the file states {' and '.join(texts)}; expected one unit")
     return units[0] if units else None
-
-
-def _is_image(lines: Sequence[str]) -> bool:
-    """Return whether a heading is that of an image which Gwyddion exported: width, height and unit in remarks."""
-    labels = [label for line in lines if line.startswith("#") for label, regex in _LABELS.items() if regex.match(line)]
-    return labels == ["width", "height", "value units"]
-
-
-def _counts_agree(lines: Sequence[str], shape: tuple[int, int]) -> bool:
-    """Return whether the heading states the rows and columns of a table; raise UnfitTopography if it states others."""
-    entries, agreed = _entries(lines), set()
-    for (axis, names), count in zip(_COUNTS.items(), shape, strict=True):
-        for value, line in (entry for name in names for entry in entries.get(name, []) if entry[0].isdecimal()):
-            if int(value) != count:
-                raise UnfitTopography(
-                    "path",
-                    f"has {count} {axis} of numbers, but its heading states {value} in {line.strip()[:40]!r}; expected "
-                    "a whole table. Export the table again, or correct or remove this line",
-                )
-            agreed.add(axis)
-    return len(agreed) == 2
-
-
-def _entries(lines):
-    """Return lists of the values, with their lines, that a heading contains, by names in small letters.
-
-    Headings of Surfer (numbers of columns and rows, then ranges of x and y) and Zygo (size of a pixel in line 8, in m;
-    heights in um) are translated into entries.
-    """
-    entries: dict[str, list[tuple[str, str]]] = {}
-
-    def add(name, value, line):
-        entries.setdefault(name, []).append((value.strip(), line))
-
-    first, previous = lines[0].strip() if lines else "", ("", "")
-    if first == "DSAA":
-        counts, *ranges = ([float(number) for number in line.split()[:2]] for line in lines[1:4])
-        steps = [abs(high - low) / (count - 1) for (low, high), count in zip(ranges, counts, strict=True)]
-        values = (f"{counts[0]:.0f}", f"{counts[1]:.0f}", "{} x {}".format(*steps), _SURFER_MISSING)
-        for name, value in zip(("ncols", "nrows", "cellsize", _MISSING[0]), values, strict=True):
-            add(name, value, lines[1])
-        return entries
-    if first.startswith("Zygo "):
-        add("value units", "um", first)
-        add("distance of points", f"{lines[7].split()[6]} m", lines[7])
-        return entries
-    for line in lines:
-        label = next(((label, match[2]) for label, regex in _LABELS.items() if (match := regex.match(line))), None)
-        if not (label or (found := _ENTRY.match(line.replace('"', "")))):
-            continue
-        # A delimiter may stand between a number and its unit.
-        name, value = label or (
-            re.sub(r"[\s_.-]+", " ", found[1].lower()).strip(),
-            re.sub(r"(?<=\d)\s*[,;\t]\s*(?=[^\W\d])", " ", found[2]),
-        )
-        add(name, value, line)
-        # The height of an image follows its width; elsewhere it may be a height of the surface.
-        if (previous[0], name) in (("width", "height"), ("dx", "dy")):
-            add("size" if name == "height" else "pixel", f"{previous[1]} x {value.strip()}", line)
-        previous = name, value.strip()
-    return entries
 
 
 def _lengths(text):

@@ -1,8 +1,5 @@
-"""Read tables of numbers from text files: encoding, heading, delimiter, decimal sign, and numbers (with pandas)."""
+"""Read tables of numbers from text files: heading, delimiter, decimal sign, and numbers (with pandas)."""
 
-import csv
-import gzip
-import io
 import itertools
 import re
 from collections import Counter
@@ -10,29 +7,25 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TextIO
 
 import numpy as np
 
+from icha.support.tables import AMBIGUOUS_COMMA, open_text, split_fields
 from icha.surfaces.measured.array_files import open_instrument
 from icha.surfaces.measured.settings import UnfitTopography
 
-# Words that mark a missing height, and words that are written as "nan" before pandas reads the numbers: nan of Windows
-# and C, and the stars that Fortran writes for numbers that are too wide.
-_WORDS = (
-    "- -- --- ? nan -nan +nan na n/a #n/a #na bad none null nil nodata no_data missing masked invalid void undefined "
-    "undef #value! #num! #div/0! #null! #ref!"
-).split()
-_MISSING = frozenset(["", *_WORDS, *map(str.upper, _WORDS), *map(str.capitalize, _WORDS), "NaN", "-NaN", "NoData"])
+# Words that mark a missing height, and words that are replaced by "nan" before lines are split: nan of Windows and C,
+# words with a blank, and the stars that Fortran writes for numbers that are too wide.
+_MISSING = frozenset(
+    " - -- --- ? nan -nan +nan na n/a #n/a #na bad none null nil nodata no_data missing masked invalid void undefined "
+    "undef #value! #num! #div/0! #null! #ref!".split(" ")
+)
 _NAN = re.compile(r"[-+]?1\.#(ind|qnan|snan)\d*|[-+]?nan\([^)]*\)|\bno data\b|\*+", re.IGNORECASE)
 # A remark begins with #. But Windows writes nan as 1.#IND and 1.#QNAN, and Excel writes errors such as #N/A.
 _REMARK = re.compile(r"(?<!1\.)#(?!N/A|NA\b|VALUE!|NUM!|DIV/0!|NULL!|REF!)", re.IGNORECASE)
 # The exponent of a number in double precision, as Fortran writes it, such as 1.5D-3.
 _FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[-+]?\d)")
-_NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)(e[-+]?\d+)?|[-+]?inf(inity)?", re.IGNORECASE)
 _PLAIN = frozenset("0123456789+-.eE,; \t")
-# A number with three digits after a comma. The comma may be a decimal sign, or it may separate thousands.
-AMBIGUOUS_COMMA = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}(?!\d)")
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+([eE][-+]?\d+)?")
 # A number, with any separator of thousands.
 _LIKE_A_NUMBER = re.compile(r"[-+]?\d[\d.,' ]*")
@@ -40,13 +33,15 @@ _LIKE_A_NUMBER = re.compile(r"[-+]?\d[\d.,' ]*")
 _BEGINNING, _LONGEST_HEADING = 2**20, 1000
 # A line is a damaged row, not titles, if it has at least this number of fields, and at least half resemble numbers.
 _FEWEST_FIELDS = 8
-# Lines that pandas reads at a time; this bounds the memory for text.
-_BATCH = 2**13
+# Numbers that pandas reads at a time; this bounds the memory for text.
+_BATCH = 2**20
 # Fewest numbers in a row or column of coordinates.
 _FEWEST_COORDINATES = 8
 # Steps from number to number count as similar if the largest one is at most this multiple of the smallest one that is
 # not zero: equal steps that are rounded to few digits.
 _SIMILAR_STEPS = 2.01
+# Number that marks a missing height in the text grids of Surfer.
+_SURFER_MISSING = "1.70141e+38"
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +50,8 @@ class Layout:
 
     Attributes
     ----------
-    heading : lines above the numbers, including remarks.
+    heading : lines above the numbers, including remarks; the headings of Surfer and Zygo are translated.
+    begin : number of lines above the numbers.
     delimiter : tab, semicolon, comma or blank.
     decimal : decimal sign, a point or a comma.
     fields : number of fields of each row, including an empty field after a delimiter at the end.
@@ -64,6 +60,7 @@ class Layout:
     """
 
     heading: tuple[str, ...]
+    begin: int
     delimiter: str
     decimal: str
     fields: int
@@ -109,57 +106,48 @@ class SourceFile:
     @cached_property
     def _table(self):
         """Numbers in the file, the line number (from 1) of each row, and whether all lines end with a delimiter."""
-        layout, end = self.table_layout, self.table_layout.delimiter
-        values, numbers, ends = [], [], end != " "
+        layout = self.table_layout
+        values, lines, ends = [], [], layout.delimiter != " "
         rows = self._rows()
-        while batch := list(itertools.islice(rows, _BATCH)):
-            values.append(_read_numbers(batch, layout))
-            numbers.append(np.array([number for number, _ in batch]))
-            ends = ends and all(text.endswith(end) for _, text in batch)
-        return np.concatenate(values)[:, : layout.fields - ends], np.concatenate(numbers), ends
+        while batch := list(itertools.islice(rows, 1 + _BATCH // layout.fields)):
+            values.append(_read_numbers(batch, layout.decimal))
+            lines.append(np.array([line for line, _ in batch]))
+            ends = ends and not any(fields[-1] for _, fields in batch)
+        numbers = np.concatenate(values)
+        if excess := numbers.size % layout.fields:
+            raise UnfitTopography(
+                "path",
+                f"has {excess} numbers in the last row, but its heading states {layout.fields}; expected a whole "
+                "table. Export the table again",
+            )
+        return numbers.reshape(-1, layout.fields)[:, : layout.fields - ends], np.concatenate(lines), ends
 
-    def _rows(self) -> Iterator[tuple[int, str]]:
-        """Yield the line number and the text of each row; raise UnfitTopography if rows have different lengths."""
-        layout, rows = self.table_layout, self._lines()
-        if layout.wrapped:
-            numbers = ((line, field) for line, text in rows for field in text.split())
-            while row := list(itertools.islice(numbers, layout.fields)):
-                if len(row) < layout.fields:
-                    raise UnfitTopography(
-                        "path",
-                        f"has {len(row)} numbers in the last row, but its heading states {layout.fields}; expected a "
-                        "whole table. Export the table again",
-                    )
-                yield row[0][0], " ".join(field for _, field in row)
-            return
-        for line, text in rows:
-            count = _count_fields(text, layout.delimiter)
-            if count != layout.fields:
-                raise UnfitTopography(
-                    "path",
-                    f"has {count} numbers in line {line} but {layout.fields} in most lines; expected rows of one "
-                    "length. Complete or remove the line; missing heights may be NaN",
-                )
-            yield line, text
-
-    def _lines(self):
-        """Yield the line number and the text of each line of numbers."""
+    def _rows(self) -> Iterator[tuple[int, list[str]]]:
+        """Yield the line number and the fields of each row; raise UnfitTopography if rows have different lengths."""
         layout = self.table_layout
         with open_text(self.path) as file:
-            for line, text in enumerate(itertools.islice(file, len(layout.heading), None), len(layout.heading) + 1):
-                text = _clean(text, layout.delimiter)
+            for line, text in enumerate(itertools.islice(file, layout.begin, None), layout.begin + 1):
+                text = _clean(text)
+                fields = split_fields(text, layout.delimiter)
                 # A line of tabs is a row of missing heights if it has as many tabs as the other rows.
-                if text and (not text.isspace() or _count_fields(text, layout.delimiter) == layout.fields):
-                    yield line, text
+                if not text or (text.isspace() and len(fields) != layout.fields):
+                    continue
+                if len(fields) != layout.fields and not layout.wrapped:
+                    raise UnfitTopography(
+                        "path",
+                        f"has {len(fields)} numbers in line {line} but {layout.fields} in most lines; expected rows of "
+                        "one length. Complete or remove the line; missing heights may be NaN",
+                    )
+                yield line, fields
 
     def refuse_blocks(self) -> None:
         """Raise UnfitTopography if empty lines or remarks divide the rows into blocks, as in files with several images.
 
         A file with empty lines or remarks between all rows is accepted.
         """
-        values, lines, _ = self._table
+        _, lines, _ = self._table
         begins = np.flatnonzero(np.diff(lines) > 1) + 1
-        if not self.table_layout.wrapped and len(begins) and min(np.diff([0, *begins, len(values)])) > 1:
+        if not self.table_layout.wrapped and len(begins) and min(np.diff([0, *begins, len(lines)])) > 1:
             raise UnfitTopography(
                 "path",
                 f"has {len(begins) + 1} blocks of rows, the second from line {lines[begins[0]]}; expected one "
@@ -173,28 +161,6 @@ class SourceFile:
         return open_instrument(self.path)
 
 
-def open_text(path: Path) -> TextIO:
-    """Open a text file with the right encoding; the file may be compressed by gzip."""
-    with path.open("rb") as file:
-        compressed = file.read(2) == b"\x1f\x8b"
-    opener = gzip.open if compressed else open
-    with opener(path, "rb") as file:
-        start = file.read(2**12)
-    return opener(path, "rt", encoding=_guess_encoding(start), errors="replace")
-
-
-def _guess_encoding(start: bytes) -> str:
-    """Guess the encoding: UTF-16 if the text begins with its byte order mark, else UTF-8, else Windows-1252."""
-    if start.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return "utf-16"
-    try:
-        # The last line is left out, because `start` may end within a character.
-        start[: start.rfind(b"\n") + 1].decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return "cp1252"
-    return "utf-8-sig"
-
-
 def first_lines(path: Path) -> list[str]:
     """Read the lines at the beginning of a text file; return an empty list if the file is not text."""
     with open_text(path) as file:
@@ -202,190 +168,145 @@ def first_lines(path: Path) -> list[str]:
     return [] if "\0" in start else start.split("\n")[:_LONGEST_HEADING]
 
 
-def _clean(line: str, delimiter: str = " ") -> str:
-    """Return a line without remark (#) and outer blanks, with numbers and words for missing heights as pandas reads.
-
-    Tabs remain at the ends, because they may separate fields.
-    """
-    text = (_REMARK.split(line, maxsplit=1)[0] if "#" in line else line).strip(" \r\n\x1a")
-    text = text.replace("−", "-")
-    # Plain numbers need no regular expression; these would be slow in long lines.
-    if not _PLAIN.issuperset(text):
-        text = _FORTRAN.sub("e", _NAN.sub("nan", text))
-    if delimiter != " " and (" " in text or "\t" in text):
-        text = re.sub(rf"[ \t]*{delimiter}[ \t]*" if delimiter in ",;" else " *\t *", delimiter, text)
-    return text
-
-
 def strip_remark(line: str) -> str:
-    """Return a line without remark (#) and outer blanks."""
-    return _REMARK.split(line, maxsplit=1)[0].strip()
+    """Return a line without remark (#) and outer blanks; tabs remain at the ends, because they may separate fields."""
+    return (_REMARK.split(line, maxsplit=1)[0] if "#" in line else line).strip(" \r\n\x1a")
 
 
-def _fields(text, delimiter):
-    """Split a line into fields without quotes and outer blanks."""
-    if delimiter == " ":
-        fields = text.split()
-    elif '"' in text:
-        fields = next(csv.reader([text], delimiter=delimiter, skipinitialspace=True))
-    else:
-        fields = text.split(delimiter)
-    return [field.strip(' "\t') for field in fields]
+def _clean(line: str) -> str:
+    """Return a line without remark, with numbers as pandas reads them."""
+    text = strip_remark(line).replace("−", "-")
+    # Plain numbers need no regular expression; these would be slow in long lines.
+    return text if _PLAIN.issuperset(text) else _FORTRAN.sub("e", _NAN.sub("nan", text))
 
 
-def _count_fields(text, delimiter):
-    if delimiter == " " or '"' in text:
-        return len(_fields(text, delimiter))
-    return text.count(delimiter) + 1
-
-
-def _is_number(field):
-    """Return whether a field is a number or a word for a missing height."""
-    return field in _MISSING or _NUMBER.fullmatch(field) is not None
-
-
-def _read_numbers(rows, layout):
-    """Read rows of numbers with pandas; raise UnfitTopography that names the first field that is not a number."""
+def _to_numbers(fields: list[str], decimal: str = ".,") -> tuple[np.ndarray, list[int]]:
+    """Convert fields to numbers, nan where missing; also return the indices of the fields that are not numbers."""
     import pandas as pd  # slow to import
 
-    try:
-        table = "\n".join(text for _, text in rows)
-        # pandas would read the word "true" as 1.
-        if not ("true" in table.lower() or "false" in table.lower()):
-            return pd.read_csv(
-                io.BytesIO(table.encode()),
-                sep=r"\s+" if layout.delimiter == " " else layout.delimiter,
-                decimal=layout.decimal,
-                quotechar='"',
-                skipinitialspace=True,
-                header=None,
-                names=range(layout.fields),
-                index_col=False,
-                dtype=float,
-                na_values=list(_MISSING),
-                keep_default_na=False,
-                skip_blank_lines=False,
-                encoding="utf-8",
-            ).to_numpy()
-    except ValueError:
-        pass
-    for line, text in rows:
-        fields = _fields(text, layout.delimiter)
-        for k, field in enumerate(fields):
-            if not _is_number(field) or {",": ".", ".": ","}[layout.decimal] in field:
-                raise _not_a_number(field, k, line)
-    raise UnfitTopography("path", f"has a field that is not a number between lines {rows[0][0]} and {rows[-1][0]}")
+    # A point must not be read as a decimal sign if the numbers have decimal commas.
+    signs = {ord(","): ".", ord("."): "." if "." in decimal else ","}
+    texts = [field.translate(signs) for field in fields] if "," in decimal else fields
+    numbers = pd.to_numeric(np.array(texts, dtype=object), errors="coerce").astype(float)
+    unknown = np.flatnonzero(np.isnan(numbers)).tolist()
+    return numbers, [k for k in unknown if fields[k].lower() not in _MISSING]
 
 
-def _not_a_number(field, index, line):
-    return UnfitTopography(
-        "path",
-        f"has {field[:40]!r} in line {line}, column {index + 1}; expected a number, or NaN where a point is "
-        "missing. Correct or remove the line",
-    )
+def _read_numbers(rows, decimal):
+    """Convert the fields of rows to numbers; raise UnfitTopography that names the first field that is not a number."""
+    numbers, wrong = _to_numbers([field for _, fields in rows for field in fields], decimal)
+    if wrong:
+        places = [(line, column, field) for line, fields in rows for column, field in enumerate(fields, 1)]
+        line, column, field = places[wrong[0]]
+        raise UnfitTopography(
+            "path",
+            f"has {field[:40]!r} in line {line}, column {column}; expected a number, or NaN where a point is missing. "
+            "Correct or remove the line",
+        )
+    return numbers
 
 
 def _find_layout(lines: list[str]) -> Layout | None:
     """Find the first line of numbers, and the notation of the numbers; None if the text has no numbers.
 
-    Raises UnfitTopography if commas may be decimal or delimiters, or if the line above the numbers is a damaged row.
+    Raises UnfitTopography if commas may be decimal or delimiters.
     """
-    start, stated = _known_beginning(lines)
-    damages = []
-    for number, line in enumerate(lines[start:], start):
-        if (text := _clean(line)).strip():
-            if delimiter := _find_delimiter(text):
+    heading, start, stated = _known_heading(lines)
+    texts = [_clean(line) for line in lines]
+    first = next((k for k in range(start, len(texts)) if _find_delimiter(texts[k])), len(texts))
+    delimiter = _find_delimiter(texts[first]) if first < len(texts) else None
+    # Rows of missing heights, and damaged rows, above the first line of numbers belong to the table.
+    width = len(split_fields(texts[first], delimiter)) if delimiter else 0
+    begin = first
+    for k in range(first - 1, start - 1, -1):
+        if texts[k]:
+            if not _is_row(texts[k], delimiter or _usual_delimiter(texts[k]), width):
                 break
-            damages.append(_find_damage(text, number + 1))
-    else:
-        if damage := next(filter(None, damages), None):
-            raise damage
+            begin = k
+    if begin == len(texts):
         return None
-    # The line above the numbers.
-    if damages and damages[-1]:
-        raise damages[-1]
-    texts = [text for line in lines[number:] if (text := _clean(line, delimiter)).strip()]
-    counts = Counter(_count_fields(text, delimiter) for text in texts)
+    if delimiter is None:
+        first, delimiter = begin, _usual_delimiter(texts[begin])
+    rows = [split_fields(text, delimiter) for text in texts[begin:] if text.strip()]
+    counts = Counter(map(len, rows))
     fields = max(counts, key=counts.__getitem__)
-    # Rows of missing heights above the first number belong to the table.
-    while number > start and fields > 1:
-        above = _fields(_clean(lines[number - 1], delimiter), delimiter)
-        if len(above) != fields or not all(field in _MISSING for field in above):
-            break
-        number -= 1
-    decimal = _find_decimal_sign([_fields(text, delimiter) for text in texts], delimiter)
     wrapped = delimiter == " " and stated not in (None, fields)
-    ends = delimiter != " " and fields > 1 and all(text.endswith(delimiter) for text in texts)
+    ends = delimiter != " " and fields > 1 and not any(row[-1] for row in rows)
     fields = stated if wrapped else fields
-    return Layout(tuple(lines[:number]), delimiter, decimal, fields, fields - ends, wrapped)
+    decimal = _find_decimal_sign(texts[first], rows, delimiter)
+    return Layout(tuple(heading or lines[:begin]), begin, delimiter, decimal, fields, fields - ends, wrapped)
 
 
-def _known_beginning(lines):
-    """Return the number of heading lines, and the columns (or None), that the heading of a known format states.
+def _known_heading(lines):
+    """Return a translation of a heading (or None), its number of lines, and the columns that it states (or None).
 
     Sources: help of Golden Software on the text grids of Surfer 6 (DSAA, columns and rows, then three lines with the
     ranges of x, y and z); description of the ASCII grids of ArcGIS by Esri; the heading of Zygo's text files ends with
-    a line #.
+    a line #, line 8 contains the size of a pixel in m, and heights are in um.
     """
     first = lines[0].strip() if lines else ""
     if first == "DSAA":
-        return 5, int(lines[1].split()[0])
+        (columns, rows), x, y = ([float(number) for number in line.split()[:2]] for line in lines[1:4])
+        dx, dy = abs(x[1] - x[0]) / (columns - 1), abs(y[1] - y[0]) / (rows - 1)
+        grid = f"ncols {columns:.0f}", f"nrows {rows:.0f}", f"dx {dx}", f"dy {dy}", f"nodata_value {_SURFER_MISSING}"
+        return grid, 5, int(columns)
     if first.startswith("Zygo "):
-        return next((k for k, line in enumerate(lines, 1) if line.strip() == "#"), 0), None
+        start = next((k for k, line in enumerate(lines, 1) if line.strip() == "#"), 0)
+        step = f"Distance of points: {lines[7].split()[6]} m" if start > 7 else ""
+        return (first, "Value units: um", step), start, None
     stated = {
         name.lower(): int(count)
         for name, count in re.findall(r"(?im)^\W*(ncols|nrows)\W+(\d+)\s*$", "\n".join(lines[:20]))
     }
-    return 0, stated["ncols"] if len(stated) == 2 else None
+    return None, 0, stated["ncols"] if len(stated) == 2 else None
 
 
 def _find_delimiter(text):
-    """Return the delimiter of a line of numbers; None for other lines.
-
-    Raises UnfitTopography if commas may be decimal signs or delimiters.
-    """
-    numbers = re.split(r",?\s+", text.strip())
-    if len(numbers) > 1 and "\t" not in text and all(map(_DECIMAL_COMMA.fullmatch, numbers)):
-        raise UnfitTopography(
-            "path",
-            f"has commas in {text[:40]!r} that may be decimal signs or delimiters; expected decimal points. "
-            "Replace the commas",
-        )
-    for delimiter in "\t;, ":
-        fields = _fields(text, delimiter) if delimiter in text or delimiter == " " else [text]
-        if len(fields) == 1 and (delimiter != " " or "," in text):
+    """Return the delimiter of a line of numbers; None for other lines, and for lines without a number."""
+    text = text.strip()
+    for delimiter in "\t;, " if text else "":
+        if delimiter not in text and (delimiter != " " or "," in text):
             continue
-        if all(map(_is_number, fields)) and not all(field in _MISSING for field in fields):
+        numbers, wrong = _to_numbers(split_fields(text, delimiter))
+        if not wrong and not np.isnan(numbers).all():
             return delimiter
     return None
 
 
-def _find_damage(text, number):
-    """Return the error for a damaged row, where most but not all fields are numbers; None for other lines."""
-    delimiter = next((each for each in "\t;," if each in text), " ")
-    fields = _fields(text, delimiter)
-    wrong = [k for k, field in enumerate(fields) if not _is_number(field)]
+def _usual_delimiter(text):
+    return next((each for each in "\t;," if each in text), " ")
+
+
+def _is_row(text, delimiter, width):
+    """Return whether a line above numbers has only missing heights, or is a damaged row: many fields are numbers.
+
+    width : number of fields of the first line of numbers.
+    """
+    fields = split_fields(text, delimiter)
+    _, wrong = _to_numbers(fields)
+    if not wrong:
+        return len(fields) == width > 1
     words = [k for k in wrong if not _LIKE_A_NUMBER.fullmatch(fields[k])]
-    if not wrong or len(fields) < _FEWEST_FIELDS or 2 * len(words) > len(fields):
-        return None
-    return _not_a_number(fields[wrong[0]], wrong[0], number)
+    return len(fields) >= _FEWEST_FIELDS and 2 * len(words) <= len(fields)
 
 
-def _find_decimal_sign(rows, delimiter):
-    """Find the decimal sign from rows of fields; raise UnfitTopography if it is not clear."""
+def _find_decimal_sign(first, rows, delimiter):
+    """Find the decimal sign from the `first` line of numbers, and the fields of all rows.
+
+    Raises UnfitTopography if commas may be decimal signs, delimiters, or separators of thousands.
+    """
     fields = [field for row in rows for field in row]
     with_comma = [field for field in fields if "," in field]
-    if with_comma and all(map(AMBIGUOUS_COMMA.fullmatch, with_comma)):
+    numbers = re.split(r",?\s+", first.strip())
+    if (
+        (delimiter in ", " and len(numbers) > 1 and all(map(_DECIMAL_COMMA.fullmatch, numbers)))
+        or (with_comma and all(map(AMBIGUOUS_COMMA.fullmatch, with_comma)))
+        or (delimiter == "," and not with_comma and _are_halves_of_decimals(rows))
+    ):
         raise UnfitTopography(
             "path",
-            f"has numbers such as {with_comma[0]}, whose comma may be decimal or separate thousands; expected decimal "
-            "points. Replace or remove the commas",
-        )
-    if delimiter == "," and not with_comma and _are_halves_of_decimals(rows):
-        raise UnfitTopography(
-            "path",
-            f"has both decimal commas and commas as delimiters, as in {','.join(rows[0][:4])}; expected decimal "
-            "points, semicolons as delimiters, or quotes around numbers with decimal commas",
+            f"has commas, as in {(with_comma or [first])[0][:40]!r}, that may be decimal signs, delimiters, or "
+            "separate thousands; expected decimal points. Replace or remove the commas",
         )
     return "," if with_comma and not any("." in field for field in fields) else "."
 
@@ -416,31 +337,24 @@ def refuse_coordinates(values: np.ndarray) -> None:
     for name, table in (("row", values), ("column", values.T)):
         if len(table) < 3 or table.shape[1] < _FEWEST_COORDINATES:
             continue
-        for place, line in (("first", table[0]), ("last", table[-1])):
-            # The corner may belong to the other axis.
-            for part in (slice(1, None), slice(-1)):
-                if _seems_an_axis(line[part], table[1:-1, part]):
+        # The corner may belong to the other axis.
+        for part in (slice(1, None), slice(-1)):
+            monotonic, similar = _find_monotonic(table[:, part])
+            for place, k in (("first", 0), ("last", -1)):
+                body = (similar if similar[k] else monotonic)[1:-1]
+                if 2 * np.sum(body) < len(body) if similar[k] else monotonic[k] and not np.any(body):
                     raise UnfitTopography(
                         "path",
-                        f"has a {place} {name} of numbers, {line[1]:g}, {line[2]:g}, {line[3]:g} …, that seem to be "
-                        f"coordinates or numbers of points. Remove the {name} if so, or save all numbers as a .npy "
-                        "file if they are heights",
+                        f"has a {place} {name} of numbers, {', '.join(f'{x:g}' for x in table[k][1:4])} …, that seem "
+                        f"to be coordinates or numbers of points. Remove the {name} if so, or save all numbers as a "
+                        ".npy file if they are heights",
                     )
 
 
-def _seems_an_axis(line, body):
-    """Return whether a line is monotonic, with similar steps or unlike all lines of the body of a table."""
-    if _has_similar_steps(line):
-        return 2 * sum(map(_has_similar_steps, body)) < len(body)
-    return _is_monotonic(line) and not any(map(_is_monotonic, body))
-
-
-def _is_monotonic(line):
-    steps = np.diff(line)
-    return bool((np.all(steps >= 0) or np.all(steps <= 0)) and np.any(steps))
-
-
-def _has_similar_steps(line):
-    """Return whether a line rises or falls in equal steps, up to rounding to few digits."""
-    steps = np.abs(np.diff(line))
-    return _is_monotonic(line) and np.max(steps) <= _SIMILAR_STEPS * np.min(steps[steps > 0])
+def _find_monotonic(table):
+    """Return masks of the rows that rise or fall, and of those that do so in equal steps, up to rounding."""
+    steps = np.diff(table)
+    monotonic = (np.all(steps >= 0, axis=1) | np.all(steps <= 0, axis=1)) & np.any(steps, axis=1)
+    sizes = np.abs(steps)
+    smallest = np.min(sizes, axis=1, where=sizes > 0, initial=np.inf)
+    return monotonic, monotonic & (np.max(sizes, axis=1) <= _SIMILAR_STEPS * smallest)
