@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scans import refused
 from typer.testing import CliRunner
 
 from icha import SelfAffineSpectrum
@@ -72,6 +73,8 @@ def test_heights_larger_than_all_digits_of_a_float_are_outliers(examined, height
     found, plain = (examined(z, outliers="remove").surface for z in (heights, PLAIN + 3 * RMS * X))
     np.testing.assert_allclose(found.heights, plain.heights, atol=0.1 * RMS)
     assert found.rms_slope == pytest.approx(plain.rms_slope, rel=0.01)
+    with refused("outliers", "keeps 1 points .* row 6, column 8 .*expected remove"):
+        examined(heights)
 
 
 @pytest.mark.parametrize("width", [4, 6, 9, 13])

@@ -23,6 +23,14 @@ def test_npy(tmp_path, first_axis, stored):
     assert_read(scan(tmp_path / "scan.npy", height_unit=NM, size=SIZE, first_axis=first_axis))
 
 
+@pytest.mark.parametrize("turned", [False, True])
+def test_arrays_of_points_are_asked_for_as_text(tmp_path, turned):
+    points = np.random.default_rng(1).normal(size=(1000, 3))
+    np.save(tmp_path / "scan.npy", points.T if turned else points)
+    with refused("path", r"seems to be points x y z; .*Save the points as text"):
+        scan(tmp_path / "scan.npy", height_unit=NM, size=SIZE)
+
+
 @pytest.mark.parametrize(("first_axis", "stored"), [("y", HEIGHTS), ("x", HEIGHTS.T)])
 def test_matrix_of_text(tmp_path, first_axis, stored):
     lines = [",".join(f"{height:.4f}" for height in row) for row in stored]
@@ -447,6 +455,8 @@ def test_first_axis_against_the_file_is_refused(tmp_path):
     write_by_surface_topography(tmp_path / "other.nc")
     with refused("first_axis", "the file states which of its axes is x"):
         scan(tmp_path / "other.nc", format="instrument", first_axis="x")
+    with refused("first_axis", "the file states which of its axes is x"):
+        scan(write_xyz(tmp_path / "scan.xyz"), height_unit=NM, lateral_unit=NM, first_axis="x")
 
 
 def test_arrays_of_matlab_that_are_no_heights(tmp_path):

@@ -22,7 +22,6 @@ from icha.surfaces.measured.settings import (
     UnfitTopography,
     choose_name,
     metres_of,
-    put_y_first,
 )
 
 # Memory for reading an array: this number of copies of the array, with 8 bytes per number.
@@ -44,7 +43,7 @@ def read_npy(file, settings: Preparation) -> FileContent:
     with np.errstate(over="ignore"):
         array = np.lib.format.open_memmap(file.path, mode="r")
     _require_room(array)
-    return FileContent(put_y_first(np.array(array), settings))
+    return FileContent(np.array(array))
 
 
 def read_npz(file, settings: Preparation) -> FileContent:
@@ -90,7 +89,7 @@ def _choose_array(arrays: Mapping[str, np.ndarray], settings) -> FileContent:
     real = {name: array for name, array in arrays.items() if array.dtype.kind in "iuf"}
     name, data = _choose_map({name: array.shape for name, array in real.items()}, settings, "real array")
     heights = real[name]
-    return FileContent(put_y_first(heights.reshape(heights.shape[-2:]), settings), data=data)
+    return FileContent(heights.reshape(heights.shape[-2:]), data=data)
 
 
 def _choose_map(shapes: Mapping[str, tuple[int, ...]], settings, what: str, usual=()) -> tuple[str, str]:
@@ -133,23 +132,14 @@ def read_netcdf(source, settings: Preparation) -> FileContent:
             sides.append(side)
             heights = np.flip(heights, axis) if decreases else heights
         unit = _unit_of(chosen.__dict__)
-    axes = [dimension.lower() for dimension in dimensions]
-    if axes == ["y", "x"]:
-        _refuse_first_axis(settings)
-    x_first = settings.first_axis == "x" or axes == ["x", "y"]
-    size = tuple(sides if x_first else sides[::-1]) if all(sides) else None
-    return FileContent(heights.T if x_first else heights, unit, size, data=data)
+    axes = "".join(dimensions).lower()
+    size = tuple(sides[::-1]) if all(sides) else None
+    return FileContent(heights, unit, size, first_axis=axes[0] if axes in ("xy", "yx") else "", data=data)
 
 
 def _is_real(variable) -> bool:
     """Return whether a netCDF variable contains real numbers, and not text or compound values."""
     return getattr(variable.dtype, "kind", "O") in "iuf"
-
-
-def _refuse_first_axis(settings):
-    """Raise UnfitTopography for `first_axis: x` if the file itself states which axis is x."""
-    if settings.first_axis == "x":
-        raise UnfitTopography("first_axis", "is x, but the file states which of its axes is x. Remove the key")
 
 
 def _side(coordinate, count):
@@ -191,7 +181,7 @@ def read_hdf5(source, settings: Preparation) -> FileContent:
         if source.path.suffix.lower() == ".mat" or "MATLAB_class" in chosen.attrs:
             heights = heights.T
         unit = _unit_of(chosen.attrs)
-    return FileContent(put_y_first(heights, settings), unit, data=data)
+    return FileContent(heights, unit, data=data)
 
 
 def _unpack(dataset):
@@ -322,7 +312,6 @@ def read_instrument(file, settings: Preparation) -> FileContent:
         opened.format() in _WITHOUT_SIGNATURE and file.path.suffix.lower()[1:] not in opened.file_extensions()
     ):
         raise UnfitTopography("path", _UNKNOWN)
-    _refuse_first_axis(settings)
     channel, data = _choose_channel(opened, settings)
     sized = channel.physical_sizes is not None
     topography = channel.topography(**({} if sized else {"physical_sizes": (1.0, 1.0)}))
@@ -332,7 +321,7 @@ def read_instrument(file, settings: Preparation) -> FileContent:
     lateral, size = settings.lateral_unit or unit, None
     if sized and lateral is not None:
         size, sides = tuple(side * lateral for side in sides), None
-    return FileContent(heights, unit, size, sides, format=opened.name(), data=data)
+    return FileContent(heights, unit, size, sides, "y", opened.name(), data=data)
 
 
 def _choose_channel(opened, settings):

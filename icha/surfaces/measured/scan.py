@@ -83,17 +83,12 @@ def load_scan(path: Path, settings: Preparation) -> Scan:
     name, found = _read(path, settings)
     unit = settings.height_unit or found.unit
     if unit is None:
-        raise UnfitTopography(
-            "height_unit",
-            "is missing, and the file does not contain the unit of the heights; expected a unit such as 'um'",
-        )
+        raise _missing("height_unit", "the unit of the heights; expected a unit such as 'um'")
     size = settings.size or found.size
     if size is None and found.coordinates is not None:
         if settings.lateral_unit is None:
-            raise UnfitTopography(
-                "lateral_unit",
-                "is missing, and the file does not contain the unit of its coordinates; expected a unit such as 'um', "
-                "or the `size` of the scan",
+            raise _missing(
+                "lateral_unit", "the unit of its coordinates; expected a unit such as 'um', or the `size` of the scan"
             )
         size = tuple(each * settings.lateral_unit for each in found.coordinates)
     elif found.coordinates is not None and not np.isclose(
@@ -105,9 +100,7 @@ def load_scan(path: Path, settings: Preparation) -> Scan:
             "the key `lateral_unit` instead".format(*found.coordinates),
         )
     if size is None:
-        raise UnfitTopography(
-            "size", "is missing, and the file does not contain the size of the scan; expected a length such as '90 um'"
-        )
+        raise _missing("size", "the size of the scan; expected a length such as '90 um'")
     replaced = []
     if settings.size and found.size and not np.allclose(settings.size, found.size, rtol=1e-3, atol=0):
         replaced.append(f"the size {' x '.join(map(formatting.length, found.size))}")
@@ -129,6 +122,11 @@ def load_scan(path: Path, settings: Preparation) -> Scan:
     if not all(np.isfinite(each) and LENGTH.contains(each) for each in size):
         raise UnfitTopography("size", f"is {size[0]:g} m by {size[1]:g} m in the file; expected the size in this key")
     return scan
+
+
+def _missing(key, value):
+    """Return the error for a missing key, whose value the file does not contain either."""
+    return UnfitTopography(key, f"is missing, and the file does not contain {value}")
 
 
 def read_height_map(path: str | Path, metres_per_unit: float) -> np.ndarray:
@@ -183,8 +181,19 @@ def _read(path, settings):
     if heights.ndim == 1 or (heights.ndim == 2 and 0 < min(heights.shape) <= 2 < max(heights.shape)):
         # An array of two columns contains x and z of a profile.
         raise UnfitTopography("path", LINE_SCAN.format(max(heights.shape)))
+    if heights.ndim == 2 and min(heights.shape) == 3 < max(heights.shape) and found.size is None:
+        raise UnfitTopography(
+            "path",
+            f"has an array of shape {heights.shape}, which seems to be points x y z; expected rows and columns of "
+            "heights. Save the points as text, with x, y and z in every line (`numpy.savetxt`)",
+        )
     if heights.ndim != 2 or not heights.size:
         raise UnfitTopography("path", f"has an array of shape {heights.shape}; expected rows and columns of heights")
+    if found.first_axis == "y" and settings.first_axis == "x":
+        raise UnfitTopography("first_axis", "is x, but the file states which of its axes is x. Remove the key")
+    if "x" in (found.first_axis, settings.first_axis):
+        sides = {name: getattr(found, name) and getattr(found, name)[::-1] for name in ("size", "coordinates")}
+        found = replace(found, heights=heights.T, **sides)
     return name, found
 
 

@@ -79,10 +79,11 @@ class FileContent:
 
     Attributes
     ----------
-    heights : (ny, nx) array, in the unit of the file, nan where missing.
+    heights : two-dimensional array, in the unit of the file, nan where missing.
     unit : unit of the heights, m; None if the file does not contain it.
-    size : sides (x, y) of the scan, m; None if the file does not contain them.
-    coordinates : sides (x, y) of the scan in an unknown unit, if the file does not contain the unit.
+    size : sides along the second and the first axis, m; None if the file does not contain them.
+    coordinates : the same sides in an unknown unit, if the file does not contain the unit.
+    first_axis : "x" or "y", the first axis of the array; empty if the file does not state it.
     format : name of the instrument's format.
     remark : description of the parts of the file that were left out.
     data : name of the array or channel that was read; empty if the file has only one.
@@ -92,14 +93,10 @@ class FileContent:
     unit: float | None = None
     size: tuple[float, float] | None = None
     coordinates: tuple[float, float] | None = None
+    first_axis: str = ""
     format: str = ""
     remark: str = ""
     data: str = ""
-
-
-def put_y_first(heights: np.ndarray, settings: Preparation) -> np.ndarray:
-    """Return the array with y as the first axis; `settings.first_axis` is the first axis in the file."""
-    return heights.T if settings.first_axis == "x" else heights
 
 
 def grid_indices(values: np.ndarray, axis: str) -> tuple[np.ndarray, int, float]:

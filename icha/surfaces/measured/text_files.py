@@ -18,7 +18,6 @@ from icha.surfaces.measured.settings import (
     UnfitTopography,
     grid_indices,
     metres_of,
-    put_y_first,
 )
 from icha.surfaces.measured.text_tables import Layout, SourceFile, refuse_coordinates, strip_remark
 
@@ -75,9 +74,15 @@ def format_of_text(file: SourceFile) -> str:
     layout = file.layout
     if layout is None:
         return "instrument"
-    if _titles(layout):
+    titles = _find_titles(layout)
+    if _read_titles(titles)[0]:
         return "xyz"
-    _refuse_measurements(layout)
+    if sum(bool(_QUANTITIES.search(title)) for title in titles) > 1:
+        raise UnfitTopography(
+            "path",
+            f"is a table of {', '.join(titles)[:80]}; expected heights over x and y. Measured loads and areas belong "
+            "to the section `measurements`",
+        )
     # Headings from instruments contain lines that are not remarks.
     if _INSTRUMENT.search("\n".join(layout.heading)) or (
         any(map(strip_remark, layout.heading)) and is_instrument_text(file)
@@ -101,17 +106,19 @@ def read_matrix(file: SourceFile, settings: Preparation) -> FileContent:
                 "Remove these delimiters, or write nan for missing heights",
             )
     size, coordinates = heading.find_size(heights.shape, settings)
-    if settings.first_axis == "x":
-        size, coordinates = size and size[::-1], coordinates and coordinates[::-1]
-    heights = put_y_first(heading.mark_missing(heights), settings)
-    return FileContent(heights, heading.find_height_unit(settings), size, coordinates)
+    return FileContent(heading.mark_missing(heights), heading.find_height_unit(settings), size, coordinates)
 
 
 def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
     """Read a text file with a point x y z in every line; points may be in any order or missing."""
     layout = file.table_layout
-    titles = _titles(layout)
-    columns = _find_columns(file.values.shape[1], settings, layout, [name for name, _ in titles])
+    titles, count = _find_titles(layout), file.values.shape[1]
+    titled, units = _read_titles(titles)
+    columns = list(settings.columns or titled or (1, 2, 3))
+    if settings.columns is None and not titled:
+        _ask_for_columns(count, titles)
+    if max(columns) > count:
+        raise UnfitTopography("columns", f"is larger than the number of columns; expected 1 to {count}")
     points = file.values[:, [column - 1 for column in columns]]
     placed = np.isfinite(points[:, :2]).all(axis=1)
     if np.isfinite(points[~placed, 2]).any():
@@ -143,7 +150,7 @@ def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
     heading = _Heading(layout)
     heights = np.full(nx * ny, np.nan)
     heights[node] = heading.mark_missing(points[:, 2])
-    x_unit, y_unit, z_unit = (metres_of(titles[column - 1][1]) if titles else None for column in columns)
+    x_unit, y_unit, z_unit = (metres_of(units[column - 1]) if units else None for column in columns)
     lateral_unit = heading.find_lateral_unit(settings)
     x_unit, y_unit = x_unit or lateral_unit, y_unit or lateral_unit
     remark = "columns x {}, y {}, z {} by their names".format(*columns)
@@ -152,7 +159,8 @@ def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
         z_unit or heading.find_height_unit(settings),
         (nx * dx * x_unit, ny * dy * y_unit) if x_unit and y_unit and settings.lateral_unit is None else None,
         (nx * dx, ny * dy),
-        remark="; ".join(filter(None, (remark if titles and columns != sorted(columns) else "", scattered))),
+        "y",
+        remark="; ".join(filter(None, (remark if titled and columns != sorted(columns) else "", scattered))),
     )
 
 
@@ -177,53 +185,32 @@ def _interpolate(points):
     return np.column_stack([x.ravel(), y.ravel(), z.ravel()]), remark
 
 
-def _words_above(layout):
+def _find_titles(layout):
     """Return the words in the last line above the numbers, one for each column; an empty list without titles."""
-    if not layout.heading:
-        return []
+    last = layout.heading[-1] if layout.heading else ""
     delimiters = r"[,;\t]" if layout.delimiter != " " else r"[,;]\s*|\s+(?![\[(])"
-    words = [word.strip(" \"'") for word in re.split(delimiters, layout.heading[-1].strip(' \t\r\n,;#%"'))]
-    return words if len(words) == layout.columns and not re.search("[:=]", layout.heading[-1]) else []
+    words = [word.strip(" \"'") for word in re.split(delimiters, last.strip(' \t\r\n,;#%"'))]
+    return words if len(words) == layout.columns and not re.search("[:=]", last) else []
 
 
-def _titles(layout):
-    """Return name and unit (as text) of every column; an empty list unless x, y and z each occur exactly once."""
-    found = [_TITLE.fullmatch(word) for word in _words_above(layout)]
+def _read_titles(titles):
+    """Return the column (from 1) of each axis x, y and z, if each occurs exactly once, and the units of all columns."""
+    found = [_TITLE.fullmatch(title) for title in titles]
     names = [match[1].lower() if match else "" for match in found]
     names = ["z" if name in _NAMES_OF_Z else name for name in names]
     if any(names.count(axis) != 1 for axis in "xyz"):
-        return []
-    return [(name, (match[2] or "") if match else "") for name, match in zip(names, found, strict=True)]
+        return [], [""] * len(titles)
+    return [names.index(axis) + 1 for axis in "xyz"], [(match and match[2]) or "" for match in found]
 
 
-def _refuse_measurements(layout):
-    """Raise UnfitTopography if the titles of the columns are quantities of a contact, such as load and radius."""
-    words = _words_above(layout)
-    if sum(bool(_QUANTITIES.search(word)) for word in words) > 1:
-        raise UnfitTopography(
-            "path",
-            f"is a table of {', '.join(words)[:80]}; expected heights over x and y. Measured loads and areas belong to "
-            "the section `measurements`",
-        )
-
-
-def _find_columns(count, settings, layout, names):
-    """Return the numbers (from 1) of the columns x, y and z in a table with `count` columns."""
-    if settings.columns is not None:
-        if max(settings.columns) > count:
-            raise UnfitTopography("columns", f"is larger than the number of columns; expected 1 to {count}")
-        return list(settings.columns)
-    if names:
-        return [names.index(axis) + 1 for axis in "xyz"]
-    _refuse_measurements(layout)
-    words = _words_above(layout)
-    if count != 3 or words:
+def _ask_for_columns(count, titles):
+    """Raise UnfitTopography unless a table has three columns without titles."""
+    if count != 3 or titles:
         waves = ". For wave vectors and amplitudes use `format: fourier`" if count == 4 else ""
-        lines = f"the columns are {', '.join(words)[:80]}" if words else f"lines have {count} numbers"
+        lines = f"the columns are {', '.join(titles)[:80]}" if titles else f"lines have {count} numbers"
         raise UnfitTopography(
             "columns", f"is missing, and {lines}; expected the columns x, y and z, such as [1, 2, 3]{waves}"
         )
-    return [1, 2, 3]
 
 
 class _Heading:
@@ -367,7 +354,7 @@ def read_fourier(file: SourceFile, settings: Preparation) -> FileContent:
         raise _not_waves("the heights would be complex; expected conjugate amplitudes of opposite wave vectors")
     spectrum = np.where(opposite_present & ~present, conjugate, spectrum)
     heights = scipy.fft.ifft2(spectrum, norm="forward", workers=1).real
-    return FileContent(heights, coordinates=(period, period))
+    return FileContent(heights, coordinates=(period, period), first_axis="y")
 
 
 def _not_waves(problem):

@@ -104,7 +104,7 @@ def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> Prepar
     ):
         prepared = step(prepared, settings)
     refuse_flat(prepared, cleaned, settings)
-    surface, steps = treat_edges(prepared, settings)
+    surface, steps = treat_edges(prepared, square, settings)
     return PreparedTopography(
         surface=surface,
         source_file=file.name,
@@ -275,12 +275,15 @@ def resample_to_square_pixels(scan: Scan, settings: Preparation) -> Scan:
 
 
 def _by_cosine_series(heights, axis, step, count):
-    """Evaluate the cosine series along an axis at the centres of `count` new pixels, each `step` old pixels wide."""
+    """Evaluate the cosine series along an axis at the centres of `count` new pixels, each `step` old pixels wide.
+
+    Waves shorter than two new pixels are left out.
+    """
     # Slow to import, and rarely needed.
     from scipy.signal import czt
 
     n = heights.shape[axis]
-    series = np.moveaxis(scipy.fft.dct(heights, axis=axis, norm="forward", workers=1), axis, 0)
+    series = np.moveaxis(scipy.fft.dct(heights, axis=axis, norm="forward", workers=1), axis, 0)[:count]
     series[1:] *= 2
     # sum_k series_k cos(pi k y/n) at y = step (j + 1/2): a chirp z-transform.
     turn = 1j * np.pi * step / n
@@ -313,8 +316,11 @@ def filter_short_waves(scan: Scan, settings: Preparation) -> Scan:
     return scan.after(heights, f"Gaussian S-filter (ISO 16610-61) with a nesting index of {settings.cutoff:.6g} m")
 
 
-def treat_edges(scan: Scan, settings: Preparation) -> tuple[Surface, list[str]]:
-    """Treat the edges as `boundary` requires, and change the grid; return the surface and descriptions of all steps."""
+def treat_edges(scan: Scan, square: Scan, settings: Preparation) -> tuple[Surface, list[str]]:
+    """Treat the edges as `boundary` requires, and change the grid; return the surface and descriptions of all steps.
+
+    square : the square before its preparation, for a message about outliers.
+    """
     nodes = settings.grid or (2 if settings.boundary == MIRROR else 1) * max(scan.heights.shape)
     try:
         # Resampling copies the heights.
@@ -344,6 +350,15 @@ def treat_edges(scan: Scan, settings: Preparation) -> tuple[Surface, list[str]]:
     try:
         return Surface(heights, side, FREE if free else PERIODIC), steps
     except ValueError as error:  # the range of heights, divided by the side, is out of bounds
+        outliers, largest = find_outliers(square.heights)
+        if settings.outliers == "keep" and outliers.any():
+            row, column = (int(each[0]) + 1 for each in np.nonzero(outliers))
+            raise UnfitTopography(
+                "outliers",
+                f"keeps {np.count_nonzero(outliers)} points that stand out by up to {largest:.3g} rms heights, the "
+                f"first in row {row}, column {column} of the square, and contact models do not accept such heights; "
+                "expected remove, or a crop without these points",
+            ) from None
         raise UnfitTopography(
             "height_unit", f"gives heights that contact models do not accept ({error}); expected another unit"
         ) from None
@@ -358,11 +373,5 @@ def _resampled(heights, grid, *, free):
         n = heights.shape[axis]
         if n == grid:
             continue
-        if not free:
-            heights = resample(heights, grid, axis=axis)
-            continue
-        series = np.moveaxis(scipy.fft.dct(heights, axis=axis, norm="forward", workers=1), axis, 0)[:grid]
-        padded = np.zeros((grid, series.shape[1]))
-        padded[: len(series)] = series
-        heights = np.moveaxis(scipy.fft.idct(padded, axis=0, norm="forward", workers=1), 0, axis)
+        heights = _by_cosine_series(heights, axis, n / grid, grid) if free else resample(heights, grid, axis=axis)
     return heights
