@@ -27,7 +27,7 @@ def test_npy(tmp_path, first_axis, stored):
 def test_arrays_of_points_are_asked_for_as_text(tmp_path, turned):
     points = np.random.default_rng(1).normal(size=(1000, 3))
     np.save(tmp_path / "scan.npy", points.T if turned else points)
-    with refused("path", r"seems to be points x y z; .*Save the points as text"):
+    with refused("path", r"seems to be points x y z; .*`format: xyz` and a text file"):
         scan(tmp_path / "scan.npy", height_unit=NM, size=SIZE)
 
 

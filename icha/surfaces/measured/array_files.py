@@ -7,7 +7,7 @@ import re
 import struct
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,6 @@ from icha.surfaces.measured.settings import (
     FileContent,
     Preparation,
     UnfitTopography,
-    choose_name,
     metres_of,
 )
 
@@ -88,8 +87,7 @@ def _choose_array(arrays: Mapping[str, np.ndarray], settings) -> FileContent:
     """Return the content of a file with several arrays: the array `settings.data`, or the only map of real numbers."""
     real = {name: array for name, array in arrays.items() if array.dtype.kind in "iuf"}
     name, data = _choose_map({name: array.shape for name, array in real.items()}, settings, "real array")
-    heights = real[name]
-    return FileContent(heights.reshape(heights.shape[-2:]), data=data)
+    return FileContent(real[name].reshape(real[name].shape[-2:]), data=data)
 
 
 def _choose_map(shapes: Mapping[str, tuple[int, ...]], settings, what: str, usual=()) -> tuple[str, str]:
@@ -101,8 +99,21 @@ def _choose_map(shapes: Mapping[str, tuple[int, ...]], settings, what: str, usua
             "data",
             f"has {len(shapes[asked])} dimensions; expected two, as in {', '.join(maps) or f'no {what} of this file'}",
         )
-    name = asked if asked in shapes else choose_name(asked or None, maps, usual, what)
+    name = asked if asked in shapes else _choose_name(asked or None, maps, usual, what)
     return name, name if len(maps) > 1 else ""
+
+
+def _choose_name(asked: str | None, names: Sequence[str], usual: Sequence[str], what: str) -> str:
+    """Choose a variable, dataset or channel (`what`) by name: `asked`, else a usual name, else the only name.
+
+    Raises UnfitTopography if the file does not contain `asked`, or if the choice is not clear.
+    """
+    for name in [asked] if asked is not None else [*usual, *(names if len(names) == 1 else ())]:
+        if name in names:
+            return name
+    given = f"is not a {what} of the file" if asked else f"is missing, and the file has {len(names) or 'no'} {what}s"
+    expected = f"one of: {', '.join(names)}" if names else f"a file with a {what} of two dimensions"
+    raise UnfitTopography("data", f"{given}; expected {expected}")
 
 
 def _read_variable(variable) -> np.ndarray:
@@ -124,8 +135,7 @@ def read_netcdf(source, settings: Preparation) -> FileContent:
         shapes = {name: each.shape for name, each in file.variables.items() if _is_real(each)}
         name, data = _choose_map(shapes, settings, "variable", ("height", "heights", "z"))
         chosen = file[name]
-        heights = _read_variable(chosen)
-        heights = heights.reshape(heights.shape[-2:])
+        heights = _read_variable(chosen).reshape(chosen.shape[-2:])
         dimensions, sides = chosen.dimensions[-2:], []
         for axis, dimension in enumerate(dimensions):
             side, decreases = _side(file.variables.get(dimension), heights.shape[axis])
@@ -197,14 +207,14 @@ def _unpack(dataset):
     return np.where(missing, np.nan, stored * scale + offset)
 
 
-def format_of_binary(path: Path) -> str | None:
-    """Return the format of a file of arrays by its content; None for text and for formats of instruments.
+def guess_format(path: Path) -> str:
+    """Guess the format of a file by its content and the ending of its name; return "text" for other files.
 
     Zygo files are HDF5 files too, and so are MATLAB files since version 7.3.
     """
     import h5py
 
-    suffix = path.suffix.lower()
+    suffix = Path(path.name.lower().removesuffix(".gz")).suffix
     if h5py.is_hdf5(path):
         with h5py.File(path) as file:
             if "_NCProperties" in file.attrs or suffix in (".nc", ".nc4"):
@@ -215,9 +225,9 @@ def format_of_binary(path: Path) -> str | None:
     with path.open("rb") as file:
         start = file.read(20)
     by_start = {b"\x93NUMPY": "npy", b"CDF": "netcdf", b"MATLAB 5.0 MAT-file": "matlab"}
-    by_suffix = {".nc": "netcdf", ".nc4": "netcdf", ".h5": "hdf5", ".hdf5": "hdf5", ".mat": "matlab", ".npz": "npz"}
     found = next((name for signature, name in by_start.items() if start.startswith(signature)), None)
-    return found or (by_suffix | {".npy": "npy"}).get(suffix)
+    by_suffix = {".nc": "netcdf", ".nc4": "netcdf", ".h5": "hdf5", ".hdf5": "hdf5", ".mat": "matlab"}
+    return found or by_suffix.get(suffix) or (suffix[1:] if suffix in (".npy", ".npz", ".xyz") else "text")
 
 
 def _is_map(shape):
@@ -330,7 +340,7 @@ def _choose_channel(opened, settings):
     names = [channel.name for channel in channels]
     maps = find_maps({k: tuple(channel.nb_grid_pts) for k, channel in enumerate(channels)})
     if settings.data is not None:
-        channel = channels[names.index(choose_name(settings.data, names, (), "channel"))]
+        channel = channels[names.index(_choose_name(settings.data, names, (), "channel"))]
     else:
         channel = opened.default_channel
     if channel.dim != 2:

@@ -11,7 +11,7 @@ from icha.support.formatting import printable
 from icha.support.input_files import RefusedFile, bounded_memory, problem_with_path, refuse_traps
 from icha.support.rules import LENGTH
 from icha.surfaces.measured.array_files import (
-    format_of_binary,
+    guess_format,
     read_hdf5,
     read_instrument,
     read_matlab,
@@ -150,7 +150,7 @@ def _read(path, settings):
         with bounded_memory():
             refuse_traps(path)
             if name == "auto":
-                name = "xyz" if settings.columns else _guess_format(path)
+                name = "xyz" if settings.columns else guess_format(path)
             library = _LIBRARIES.get(name)
             if name in ("text", "matrix") and (file.layout is None or file.layout.heading):
                 library = "SurfaceTopography"
@@ -185,7 +185,7 @@ def _read(path, settings):
         raise UnfitTopography(
             "path",
             f"has an array of shape {heights.shape}, which seems to be points x y z; expected rows and columns of "
-            "heights. Save the points as text, with x, y and z in every line (`numpy.savetxt`)",
+            "heights, or `format: xyz` and a text file with x, y and z in every line (`numpy.savetxt`)",
         )
     if heights.ndim != 2 or not heights.size:
         raise UnfitTopography("path", f"has an array of shape {heights.shape}; expected rows and columns of heights")
@@ -195,10 +195,3 @@ def _read(path, settings):
         sides = {name: getattr(found, name) and getattr(found, name)[::-1] for name in ("size", "coordinates")}
         found = replace(found, heights=heights.T, **sides)
     return name, found
-
-
-def _guess_format(path: Path) -> str:
-    """Guess the format of a file by its content and the ending of its name; return "text" for other files."""
-    if Path(path.name.lower().removesuffix(".gz")).suffix == ".xyz":
-        return "xyz"
-    return format_of_binary(path) or "text"

@@ -1,6 +1,6 @@
 """Settings of a measured topography, the content of its file, and functions that several readers use."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -120,19 +120,6 @@ def grid_indices(values: np.ndarray, axis: str) -> tuple[np.ndarray, int, float]
         f"does not allow coordinates {axis} that are not on a regular grid of at most {GRID.most} points; expected "
         "interpolate, or a file with rows and columns of points",
     )
-
-
-def choose_name(asked: str | None, names: Sequence[str], usual: Sequence[str], what: str) -> str:
-    """Choose a variable, dataset or channel (`what`) by name: `asked`, else a usual name, else the only name.
-
-    Raises UnfitTopography if the file does not contain `asked`, or if the choice is not clear.
-    """
-    for name in [asked] if asked is not None else [*usual, *(names if len(names) == 1 else ())]:
-        if name in names:
-            return name
-    given = f"is not a {what} of the file" if asked else f"is missing, and the file has {len(names) or 'no'} {what}s"
-    expected = f"one of: {', '.join(names)}" if names else f"a file with a {what} of two dimensions"
-    raise UnfitTopography("data", f"{given}; expected {expected}")
 
 
 def metres_of(unit: str) -> float | None:
