@@ -26,7 +26,9 @@ def answer(
     from icha.datasets.files import read_campaign
     from icha.datasets.results import ANSWERS, SENSITIVITY
 
-    folder = Path(results) if Path(results).is_dir() else project() / "results" / results
+    folder = Path(results)
+    if folder.name == results and not folder.is_dir():
+        folder = project() / "results" / results
     file, sampled = folder / ANSWERS, folder / SENSITIVITY
     if not file.is_file() and not sampled.is_file():
         raise UserError(

@@ -332,28 +332,32 @@ class Campaign(Section):
         the contact on a layer may be smaller than on a half-space, so only radii that are targets are known.
         """
         from icha.references.indentation import contact_radius_at
+        from icha.references.limits import convert_target
 
-        shape, section = self.surfaces[surface].shape.shape, self.materials[material]
+        shape, section, side = self.surfaces[surface].shape.shape, self.materials[material], self.period(surface)
+        adhesive, layer = section.surface_energy > 0, section.thickness is not None
 
-        def radius(kind, value):
-            if kind == CONTACT_RADIUS:
+        def radius(quantity, value):
+            if quantity == CONTACT_RADIUS:
                 return value
-            return contact_radius_at(kind, value, shape, section.contact_modulus, section.surface_energy)
+            return contact_radius_at(quantity, value, shape, section.contact_modulus, section.surface_energy)
 
-        known, radii = {CONTACT_RADIUS}, {}
-        if not (section.thickness and section.surface_energy):
-            known.add(INDENTATION)
-        if not section.thickness:
-            known.add(FORCE)
-            radii = {(): radius(INDENTATION, 0.0)} if section.surface_energy else {}
-        return radii | {at: radius(kind, value) for at, kind, value in study.states() if kind in known}
+        known = {CONTACT_RADIUS}
+        known |= set() if layer and adhesive else {INDENTATION}
+        known |= set() if layer else {FORCE}
+        radii = {(): radius(INDENTATION, 0.0)} if adhesive and not layer else {}
+        for location, kind, value in study.states():
+            quantity, value = convert_target(shape, side, section.contact_modulus, kind, value)
+            if quantity in known:
+                radii[location] = radius(quantity, value)
+        return radii
 
     def _edge_problems(self, study: Study) -> Iterator[Problem]:
         """Yield a problem for each shape whose contact is larger than its square, by the theory of smooth shapes."""
         values = {location: value for location, _, value in study.states()} | {(): study.surfaces}
         for name, label in itertools.product(study.surfaces, study.materials):
-            side = getattr(self._grid_and_period(name), "period", math.inf)
-            if not self.surfaces[name].shape:
+            side = getattr(self._grid_and_period(name), "period", None)
+            if side is None or not self.surfaces[name].shape:
                 continue
             for location, a in self.contact_radii(study, name, label).items():
                 # Roughness may prevent the jump-in of the smooth shape.

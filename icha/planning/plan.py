@@ -225,7 +225,8 @@ def _cost_parameters(settings, side) -> dict:
     stops = {(kind, value) for kind, each in QUANTITIES.items() for value in path.get(each.plural) or ()}
     stops |= {tuple(snapshot) for snapshot in snapshots or ()}
     return {
-        "load": max(loads[kind](value) if kind in loads else _UNKNOWN_LOAD for kind, value in stops),
+        # Targets in tension have few spots.
+        "load": max(0.0, *(loads[kind](value) if kind in loads else _UNKNOWN_LOAD for kind, value in stops)),
         "stops": len(stops),
         "snapshots": 1 if snapshots is None else len(snapshots),
         "adhesive": settings["material"]["surface_energy"] > 0,

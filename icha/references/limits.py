@@ -11,14 +11,13 @@ from icha.asperity.material import Material
 from icha.asperity.tabor import describe_short_range
 from icha.contact.models import MODELS
 from icha.path.targets import (
-    AREA_FRACTION,
+    AREAS,
     CONTACT_RADIUS,
     FORCE,
     INDENTATION,
     MEAN_SEPARATION,
     NOMINAL_PRESSURE,
     REDUCED_PRESSURE,
-    RELATIVE_LOAD,
     Path,
 )
 from icha.references.indentation import axisymmetric_contact, sphere_contact, stable_branches
@@ -41,10 +40,9 @@ def radius_at_target(shape: Shape, side: float, material: Material, kind: str, v
     side : side of the square, m; the radius is at most that of a circle around the square.
     kind, value : target, as in `icha.path.targets.Target`.
     """
-    if kind == AREA_FRACTION:
-        return side * math.sqrt(value / math.pi)
-    if kind == CONTACT_RADIUS:
-        return value
+    quantity, prescribed = convert_target(shape, side, material.contact_modulus, kind, value)
+    if quantity == CONTACT_RADIUS:
+        return prescribed
     if (end := shape.end_radius) is not None:
         return end
     radii = _RADII * side / 2
@@ -53,23 +51,38 @@ def radius_at_target(shape: Shape, side: float, material: Material, kind: str, v
     else:
         radii = radii[radii < getattr(shape, "radius", math.inf)]
         states = axisymmetric_contact(radii, shape.slope, material.contact_modulus, material.surface_energy)
-    control = "indentation" if kind in (INDENTATION, MEAN_SEPARATION) else "force"
-    prescribed = _prescribed(shape, side, material, kind, value)
-    loading, _ = stable_branches(states, control)
-    given = np.asarray(getattr(states, control))[loading]
+    loading, _ = stable_branches(states, quantity)
+    given = np.asarray(getattr(states, quantity))[loading]
     if not len(given):  # adhesion pulls the whole square into contact
         return float(radii[-1])
     return float(np.interp(prescribed, given, radii[loading], left=0.0))
 
 
-def _prescribed(shape, side, material, kind, value):
-    """Return the indentation, m, or the force, N, of a target."""
-    area, modulus = side**2, material.contact_modulus
+def convert_target(shape: Shape, side: float, contact_modulus: float, kind: str, value: float) -> tuple[str, float]:
+    """Convert a target on a square with a shape to a contact radius (m), an indentation (m) or a force (N).
+
+    An area counts as that of a circle.
+
+    Parameters
+    ----------
+    side : side of the square, m.
+    contact_modulus : E*, Pa.
+    kind, value : target, as in `icha.path.targets.Target`.
+
+    Returns
+    -------
+    CONTACT_RADIUS, INDENTATION or FORCE, and its value.
+    """
+    area = side**2
+    if kind in AREAS:
+        return CONTACT_RADIUS, value if kind == CONTACT_RADIUS else math.sqrt(value * area / math.pi)
+    if kind in (INDENTATION, MEAN_SEPARATION):
+        return INDENTATION, value if kind == INDENTATION else -value
     if kind == REDUCED_PRESSURE:
         # The unit of slopes of a shape hardly depends on the grid.
-        return value * modulus * area * Surface(np.zeros((64, 64)), side, FREE, shape).unit_slope
-    factors = {FORCE: 1.0, NOMINAL_PRESSURE: area, RELATIVE_LOAD: modulus * area, INDENTATION: 1.0, MEAN_SEPARATION: -1}
-    return value * factors[kind]
+        value *= Surface(np.zeros((64, 64)), side, FREE, shape).unit_slope
+    units = {FORCE: 1.0, NOMINAL_PRESSURE: area}
+    return FORCE, value * units.get(kind, contact_modulus * area)
 
 
 def contact_resolution(

@@ -148,6 +148,12 @@ def test_a_new_campaign_is_valid(project, options):
     assert time_on(plan(campaign, project / "results/mine"), 2) < 60
 
 
+@pytest.mark.parametrize("results", ["results/mine", "mine"])
+def test_answers_before_the_campaign_has_run_are_missed_in_its_folder(results, project):
+    message = printed("answer", results, status=2)
+    assert "results/mine/aggregated/answers.nc: there are no answers" in message and "results/results" not in message
+
+
 def test_a_measured_surface_on_an_indenter_needs_only_the_radius(project):
     write_scan("scan.txt", rough_heights(), "10 um")
     written = printed("new", "lens", "--measured", "scan.txt", "--indenter")

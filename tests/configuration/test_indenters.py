@@ -130,8 +130,22 @@ def test_contacts_larger_than_the_square_are_refused(targets, radius, refused):
             {"studies.one.targets": {"contact_radii": ["101 um"]}},
             "contact_radii[0]: '101 um' gives 'soft' on 'ball' a c",
         ),
+        # 10 MPa on (200 um)^2 are 0.4 N: 229 um by Hertz, with 1 mm and 25 MPa; JKR adds 4 um.
+        (
+            {"studies.one.targets": {"pressures": ["10 kPa", "10 MPa"]}},
+            "pressures[1]: '10 MPa' gives 'soft' on 'ball' a contact radius of about 233 um",
+        ),
+        # Rms height of r^2/(2 R) on a square of side L: L^2/(2 R) sqrt(1/90) = 2.11 um, so p* = 40 are 0.42 N.
+        (
+            {"studies.one.targets": {"reduced_pressures": [0.01, 40.0]}},
+            "reduced_pressures[1]: 40.0 gives 'soft' on 'ball' a contact radius of about 23",
+        ),
+        (
+            {"studies.one.targets": {"area_fractions": [0.1, 0.9]}},
+            "area_fractions[1]: 0.9 gives 'soft' on 'ball' a contact radius of about 107 um",
+        ),
     ],
-    ids=["jump-in", "cone", "turning point", "radius"],
+    ids=["jump-in", "cone", "turning point", "radius", "pressure", "reduced pressure", "area fraction"],
 )
 def test_contacts_that_reach_the_edges_are_refused(changes, message, refused):
     alone = {"surfaces.ball": dict(BALL), "studies.one.surfaces": ["ball"], "studies.one.rms_slopes": None}

@@ -49,6 +49,15 @@ def campaign(tmp_path):
     return load_configuration(tmp_path / "scanned.yaml").campaign
 
 
+def test_tensile_targets_have_a_cost(tmp_path):
+    text = CAMPAIGN.replace("[rough, scan, map]", "[rough]").replace("[bare, soft]", "[soft]")
+    text = text.replace("reduced_pressures: [1.0e-3, 1.0e-2]", "pressures: [-10 kPa]").replace("map.npy", "scan.npy")
+    (tmp_path / "scanned.yaml").write_text(text)
+    np.save(tmp_path / "scan.npy", np.random.default_rng(1).normal(size=(40, 40)))
+    items = plan(load_configuration(tmp_path / "scanned.yaml").campaign, tmp_path)
+    assert all(item.cost.seconds > 0 for item in items if item.is_run)
+
+
 def test_the_summits_of_a_measured_surface_are_counted_in_its_file(campaign):
     section = campaign.surfaces["scan"]
     surface = prepared_topography(section.path, section.preparation).surface

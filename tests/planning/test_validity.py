@@ -100,6 +100,19 @@ studies:
 """
 
 
+@pytest.mark.parametrize(
+    ("pressure", "energy", "radius"), [("10 kPa", 50, "97.98"), ("100 kPa", 50, "178.2"), ("10 kPa", 0, "76.31")]
+)
+def test_pressures_on_indenters_are_compared_with_the_square(pressure, energy, radius, tmp_path):
+    """By hand: JKR a^3 = 3 R/(4 E*) [F + 3 pi w R + sqrt(6 pi w R F + (3 pi w R)^2)], and Hertz with w = 0."""
+    text = INDENTERS.replace("[ball, punch]", "[ball]").replace("[rubber, film]", "[rubber]")
+    text = text.replace("forces: [0 mN, 0.2 mN]", f"pressures: [{pressure}]").replace("energy: 50", f"energy: {energy}")
+    (tmp_path / "indenters.yaml").write_text(text)
+    said = expected_validity(load_configuration(tmp_path / "indenters.yaml").campaign)
+    (ball,) = (each.text for each in said if each.about == "indenter")
+    assert f"at most {radius} µm; half the side is 200 µm" in ball
+
+
 def test_contacts_of_indenters_are_compared_with_the_square_and_the_layer(tmp_path):
     """JKR at zero load: a^3 = 9 pi w R^2/(2 E*); at the indentation 0: a^3 = 2 pi w R^2/E*. Kendall: 8 pi E* w a^3."""
     (tmp_path / "indenters.yaml").write_text(INDENTERS)
