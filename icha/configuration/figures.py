@@ -9,7 +9,7 @@ from pydantic import ConfigDict, Field, create_model, model_validator
 from icha.figures.declaration import FigureOptions
 from icha.figures.own_figure import OwnFigure, caption_in, modules_of
 from icha.figures.registry import DECLARATIONS, figure_number
-from icha.support.values import File, Name, Positive, Problem, Section, Text, conversion_factor, unknown
+from icha.support.values import NOTHING, File, Name, Positive, Problem, Section, Text, conversion_factor, unknown
 
 
 def _factor(unit: str, si_unit: str) -> float | None:
@@ -42,13 +42,14 @@ class Measurement(Section):
     """Name of the study that is compared with the measurement."""
     load: Column
     """Column of the loads. Loads with the unit `1` are reduced pressures p/(E* h'rms). Loads with a unit of pressure,
-    such as `kPa`, are nominal pressures, and need the keys `material` and `rms_slope`."""
+    such as `kPa`, are nominal pressures, and need the key `material`."""
     area: Column
     """Column of the contact area fractions A/A0, with the unit `1` or `percent`."""
     material: Name | None = None
     """Material of the measurement. This key is required if the loads are nominal pressures."""
     rms_slope: Positive | None = None
-    """Rms slope of the measured surface. This key is required if the loads are nominal pressures."""
+    """Rms slope h'rms of the measured roughness. This key is required if the loads are nominal pressures; or, if a
+    surface of the study has a shape, if they are reduced pressures."""
 
     @property
     def load_is_pressure(self) -> bool:
@@ -68,15 +69,21 @@ class Measurement(Section):
             raise ValueError(f"load: the unit is {load!r}; expected '1' or a unit of pressure, such as 'kPa'")
         if _factor(area, "1") is None:
             raise ValueError(f"area: the unit is {area!r}; expected '1' or 'percent'")
-        if self.load_is_pressure and (self.material is None or self.rms_slope is None):
-            raise ValueError(f"load in {load!r} without material and rms_slope; expected both keys, or the unit '1'")
+        if self.load_is_pressure and self.material is None:
+            raise ValueError(f"load in {load!r} without material; expected this key, or the unit '1'")
         return self
 
     def problems(self, campaign: Any) -> Iterator[Problem]:
-        """Yield a problem for each name in this entry that the campaign does not define."""
+        """Yield a problem for each name that the campaign does not define, and for loads without a needed rms slope."""
         yield from unknown(("study",), self.study, campaign.studies)
         if self.material is not None:
             yield from unknown(("material",), self.material, campaign.materials)
+        if self.rms_slope is None and self.study in campaign.studies:
+            # Figure 5 shows relative loads if a surface has a shape, and reduced pressures otherwise.
+            shaped = any(campaign.surfaces[name].shape for name in campaign.studies[self.study].surfaces)
+            if shaped != self.load_is_pressure:
+                loads = f"loads in {self.load.unit!r}" + (" beside a surface with a shape" if shaped else "")
+                yield ("rms_slope",), NOTHING, f"the key is missing; expected the measured rms slope, for {loads}"
 
 
 class _Drawn(Section):

@@ -146,7 +146,8 @@ class Targets(Section):
 
     reduced_pressures: stops(ReducedPressure, increasing) | None = Field(
         default=None,
-        description=f"Reduced pressures p/(E* h'rms), increasing. Limit of the asperity model: {MAX_REDUCED_PRESSURE}.",
+        description="Reduced pressures p/(E* h'rms), increasing. On a surface with a shape, `unit_slope` replaces "
+        f"h'rms: the rms height of the shape divided by the side. Limit of the asperity model: {MAX_REDUCED_PRESSURE}.",
     )
     area_fractions: stops(AreaFraction, increasing) | None = Field(
         default=None,

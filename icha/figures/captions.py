@@ -14,6 +14,7 @@ import numpy as np
 
 from icha.datasets.labels import LABELS, slopes_of
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
+from icha.figures.select import has_shape
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -42,7 +43,9 @@ def caption_of(name: str, shown: str, grid: str = "") -> str:
     def choose(found):
         return f"{found[2]} " if re.search(found[1], shown, re.MULTILINE) else ""
 
-    return _CONDITIONAL.sub(choose, _texts()[name].format_map(_texts() | {"grid_of_loops": grid})).strip()
+    return _CONDITIONAL.sub(
+        choose, f"{_texts()[name]} {{units_of_shapes}}".format_map(_texts() | {"grid_of_loops": grid})
+    ).strip()
 
 
 def texts_of(figure: Figure, data: Mapping[str, object], studies: Sequence[str]) -> str:
@@ -50,12 +53,13 @@ def texts_of(figure: Figure, data: Mapping[str, object], studies: Sequence[str])
 
     Words are the names of the `data`, and words for the `studies` that are shown: materials that are `bare`, `adhesive`
     or `with and without adhesion`; `several surfaces`, `several slopes`, `bare at several slopes`, `adhesive at several
-    slopes`, `one seed`, `periodic` surfaces; boundary elements with which the model was compared, `in the limit` or `at
-    finite range`.
+    slopes`, `one seed`, `periodic` surfaces, `units of a shape`; boundary elements with which the model was compared,
+    `in the limit` or `at finite range`.
     """
     from matplotlib.text import Text
 
     words = [*data, *(text.get_text() for text in figure.findobj(Text))]
+    has_units = any(r"\mathrm{rms}" in word for word in words)
     campaign = data["campaign"].children if "campaign" in data else {}
     for study in (campaign[name].to_dataset() for name in studies if name in campaign):
         bare, adhesive = (study["surface_energy"] == 0).any(), (study["surface_energy"] > 0).any()
@@ -69,6 +73,7 @@ def texts_of(figure: Figure, data: Mapping[str, object], studies: Sequence[str])
             "bare at several slopes": bare and several_slopes,
             "adhesive at several slopes": adhesive and several_slopes,
             "one seed": study.sizes["seed"] == 1,
+            "units of a shape": has_units and has_shape(study),
             "periodic": (study["boundary"] == "periodic").any(),
         }
         words += [word for word, holds in conditions.items() if holds]
@@ -76,6 +81,12 @@ def texts_of(figure: Figure, data: Mapping[str, object], studies: Sequence[str])
     truths = {node.attrs.get("truth") for node in compared if node.attrs.get("study") in studies}
     words += ["in the limit"] if SHORT_RANGE in truths else []
     return "\n".join(words + (["at finite range"] if FINITE_RANGE in truths else []))
+
+
+def sentence_on_measurements(measurements: Sequence[Mapping[str, object]]) -> str:
+    """Return a sentence with label and citation of each measurement in a figure; "" without measurements."""
+    named = "; ".join(f"{each['label']} ({each['citation']})" for each in measurements)
+    return f"Lines without markers are measurements: {named}." if named else ""
 
 
 def sentence_on_loops(data: Mapping[str, object], studies: Sequence[str]) -> str:

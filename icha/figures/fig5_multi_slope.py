@@ -22,6 +22,7 @@ from icha.figures.curves import (
 )
 from icha.figures.declaration import Campaign, Declaration, Inputs, TruthFigure
 from icha.figures.looks import ASPERITIES_NAME, MODEL_MARKERS, TRUTH_LINE, model_handle, surface_label
+from icha.figures.select import has_shape
 from icha.figures.style import DASHES, in_style, new_panels
 from icha.support.tables import read_columns
 
@@ -37,11 +38,9 @@ class SlopesAndMaterialsFigure(TruthFigure):
         """Return the arguments of `figure`, with the `measurements`."""
         known = []
         for each in self.measurements(campaign):
-            names = ("label", "columns", "material", "rms_slope")
-            unit = 1.0
-            if each.load_is_pressure:
-                unit = campaign.materials[each.material].contact_modulus * each.rms_slope
-            known.append({name: getattr(each, name) for name in names} | {"load_unit": unit})
+            names = ("label", "citation", "columns", "material", "rms_slope")
+            modulus = campaign.materials[each.material].contact_modulus if each.load_is_pressure else None
+            known.append({name: getattr(each, name) for name in names} | {"contact_modulus": modulus})
         return super().arguments(campaign) | ({"measurements": known} if known else {})
 
     def measurements(self, campaign: Campaign) -> list:
@@ -77,12 +76,16 @@ def figure(
 ) -> Figure:
     """Draw all runs of a study: area, and area over load; with several slopes of several surfaces, only the latter.
 
+    Area over load is drawn against the reduced pressure. If a surface has a shape, it is drawn against the relative
+    load, because the unit of reduced pressures of a shape is not the rms slope, which a measurement has.
+
     Parameters
     ----------
     campaign : the campaign dataset.
-    tables : files of measured curves; panels of the area show only curves with a known rms slope.
-    measurements : for each table, the values of `label`, `columns` (headings and factors), `load_unit`, `material` and
-        `rms_slope`. The `load_unit` is the load divided by the reduced pressure. Unknown values are None.
+    tables : files of measured curves; axes of relative loads show only curves whose relative loads are known.
+    measurements : for each table, the values of `label`, `citation`, `columns` (headings and factors), `material`,
+        `rms_slope` and `contact_modulus`. The last is E*, Pa, if the loads are pressures in Pa; it is None if they are
+        reduced pressures p/(E* h'rms). Unknown values are None.
     """
     curves = study_curves(campaign, study, boundary_elements)
     looks = curves.looks
@@ -94,10 +97,11 @@ def figure(
         # Open markers do not hide each other where curves coincide.
         curves = study_curves(campaign, study, boundary_elements, mfc="none")
     rows = [[material] for material in looks.materials] if own_rows else [looks.materials]
-    columns = [(_area_at_load, None), (ratio_points, None)]
+    ratio = _ratio_at_load if has_shape(campaign[study].to_dataset()) else ratio_points
+    columns = [(_area_at_load, None), (ratio, None)]
     surfaces = list(dict.fromkeys(surface for surface, _ in looks.places))
     if looks.slopes_per_surface and len(surfaces) <= _MOST_SURFACES:
-        columns = [(ratio_points, surface) for surface in surfaces]
+        columns = [(ratio, surface) for surface in surfaces]
     fig, panels = new_panels(0.5 + 2.8 * len(rows), len(rows), len(columns), sharex="col")
     measured = [
         (read_columns(table, known["columns"]), known) for table, known in zip(tables, measurements, strict=True)
@@ -112,16 +116,16 @@ def figure(
             for k, (curve, known) in enumerate(measured):
                 if known["material"] in (None, *materials):
                     look = {"color": looks.material_colour(known["material"]), "ls": DASHES[k % len(DASHES)]}
-                    _draw_measured(ax, points, *curve, known, look)
+                    values = np.append(values, _draw_measured(ax, points, *curve, known, look))
             words = [surface_label(campaign, surface)] if surface else []
             words += [looks.material_name(materials[0])] if own_rows else []
             ax.set_title(", ".join(words), loc="right", fontsize=8)
-            ax.set_ylabel(RATIO_LABEL if points is ratio_points else AREA_LABEL)
-            ratios += [values] if points is ratio_points else []
-        for ax in row[[points is ratio_points for points, _ in columns]]:
+            ax.set_ylabel(_LABELS[points][1])
+            ratios += [values] if points is ratio else []
+        for ax in row[[points is ratio for points, _ in columns]]:
             limit_ratios(ax, np.concatenate(ratios))
     for ax, (points, _) in zip(panels[-1], columns, strict=True):
-        ax.set_xlabel(PRESSURE_LABEL if points is ratio_points else r"relative load  $F/(E^{\ast}A_0)$")
+        ax.set_xlabel(_LABELS[points][0])
     add_legend(fig, panels.ravel(), curves)
     return fig
 
@@ -141,14 +145,32 @@ def _select(curves, materials, surface):
 
 
 def _draw_measured(ax, points, load, area, known, look):
-    """Draw a measured curve; on an axis of relative loads, only if the rms slope is known."""
-    pressure, slope = load / known["load_unit"], known["rms_slope"]
-    look |= {"lw": 1.1, "zorder": 1, "label": known["label"]}
-    if points is ratio_points:
-        ax.plot(pressure, area / pressure, **look)
-    elif slope is not None:
-        ax.plot(pressure * slope, area, **look)
+    """Draw a measured curve, if its loads are known in the unit of the axis, and return the values that are drawn."""
+    slope, modulus = known["rms_slope"], known["contact_modulus"]
+    unit = 1.0 if modulus is None else modulus * slope if slope else None
+    if points is not ratio_points:
+        unit = modulus or (1 / slope if slope else None)
+    if unit is None:
+        return np.empty(0)
+    load = load / unit
+    values = area if points is _area_at_load else area / load
+    ax.plot(load, values, **look | {"lw": 1.1, "zorder": 1, "label": known["label"]})
+    return values
 
 
 def _area_at_load(run):
     return run["reduced_pressure"].values * float(run["unit_slope"]), run["contact_area_fraction"].values
+
+
+def _ratio_at_load(run):
+    pressure, ratio = ratio_points(run)
+    return pressure * float(run["unit_slope"]), ratio / float(run["unit_slope"])
+
+
+_LOAD_LABEL = r"relative load  $F/(E^{\ast}A_0)$"
+# Labels of the load and of the values, by the function that returns the points of a run.
+_LABELS = {
+    ratio_points: (PRESSURE_LABEL, RATIO_LABEL),
+    _area_at_load: (_LOAD_LABEL, AREA_LABEL),
+    _ratio_at_load: (_LOAD_LABEL, r"contact area over load  $AE^{\ast}/F$"),
+}

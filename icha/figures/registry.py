@@ -15,7 +15,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import icha.figures
-from icha.figures.captions import caption_of, count_runs, sentence_on_loops, texts_of
+from icha.figures.captions import caption_of, count_runs, sentence_on_loops, sentence_on_measurements, texts_of
 from icha.figures.declaration import Declaration
 from icha.figures.own_figure import caption_in
 from icha.figures.style import GREY, in_style, new_figure, save
@@ -85,6 +85,7 @@ def draw_figure(
             caption = caption_in(data["script"])
         else:
             caption = caption_of(name, shown, sentence_on_loops(data, studies))
+            caption = f"{caption} {sentence_on_measurements(arguments.get('measurements', ()))}".strip()
     except NothingToDraw as reason:
         caption = f"Nothing to draw: {reason}."
         print(caption)

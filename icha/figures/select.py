@@ -108,6 +108,11 @@ def asked_seeds(study: xr.Dataset, labels: RunLabels) -> int:
     return int(np.isin(study["status"].isel(at).values, (*COMPUTED_RUNS, MISSING)).sum())
 
 
+def has_shape(study: xr.Dataset) -> bool:
+    """Return whether a surface of a study has a shape, so that its units of loads and separations are the shape's."""
+    return "shape" in study and bool((study["shape"] != "").any())
+
+
 def is_applicable(run: xr.Dataset) -> bool:
     """Return False if a run states a reason why the asperity model is not applicable, otherwise True."""
     return not run.attrs.get("applicability")

@@ -17,7 +17,7 @@ class PathState(Section):
     """A state of a path. Exactly one key must be given. Tensile loads are negative."""
 
     reduced_pressure: ReducedPressure | None = Field(  # type: ignore[valid-type]
-        default=None, description="Reduced pressure p/(E* h'rms) of the state."
+        default=None, description="Reduced pressure of the state, in the unit of targets."
     )
     relative_load: number(NUMBER) | None = Field(  # type: ignore[valid-type]
         default=None, description="Relative load p/E* = F/(E* A0) of the state, independent of the surface slope."

@@ -25,7 +25,17 @@ def test_measurements(load, tmp_path):
     campaign = load(changes).campaign
     (settings,) = campaign.figures.by_name()["fig5_multi_slope"].arguments(campaign)["measurements"]
     assert settings["columns"] == {"p": 1e3, "a": 0.01}
-    assert settings["load_unit"] == 25e6 * 0.5
+    assert settings["contact_modulus"] == 25e6 and settings["rms_slope"] == 0.5
+
+
+def test_beside_a_shape_pressures_need_no_slope_and_reduced_pressures_do(load, tmp_path):
+    (tmp_path / "points.csv").write_text("p, a\n10, 1\n")
+    shape = {"surfaces.rough.shape": {"sphere": {"radius": "1 mm"}}}
+    assert load(shape | {"measurements": {"lab": _measurement(rms_slope=None)}}).campaign.measurements
+    reduced = _measurement(rms_slope=None, load={"column": "p", "unit": "1"})
+    assert load({"measurements": {"lab": reduced}}).campaign.measurements
+    with pytest.raises(ConfigurationError, match=r"lab\.rms_slope: the key is missing; .* beside a surface with"):
+        load(shape | {"measurements": {"lab": reduced}})
 
 
 @pytest.mark.parametrize(
@@ -68,7 +78,8 @@ def test_tables_as_spreadsheets_write_them(content, tmp_path):
         ("p,a\n1,2\n", {"path": "none.csv"}, "no such file; expected a text file with a table"),
         ("p,a\n1,2\n", {"study": "two"}, "'two' is not defined"),
         ("p,a\n1,2\n", {"material": "hard"}, "'hard' is not defined"),
-        ("p,a\n1,2\n", {"rms_slope": None}, "without material and rms_slope"),
+        ("p,a\n1,2\n", {"rms_slope": None}, "lab.rms_slope: the key is missing"),
+        ("p,a\n1,2\n", {"material": None}, "without material"),
         ("p,a\n1,2\n", {"load": {"column": "p", "unit": "kg"}}, "a unit of pressure"),
         ("p,a\n1,2\n", {"area": {"column": "a", "unit": "m"}}, "expected '1' or 'percent'"),
     ],

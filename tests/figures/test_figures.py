@@ -15,7 +15,7 @@ from matplotlib.colors import to_hex, to_rgb
 import icha
 from icha.analysis.model_error import jaccard
 from icha.datasets.campaign import campaign_tree
-from icha.datasets.files import read_dataset
+from icha.datasets.files import read_dataset, write_dataset
 from icha.datasets.labels import RunLabels
 from icha.datasets.surface_file import write_surface
 from icha.figures import (
@@ -35,6 +35,7 @@ from icha.figures import (
 from icha.figures.captions import caption_of, texts_of
 from icha.figures.looks import material_colours, some_of
 from icha.figures.maps import average_blocks, wrap_circles
+from icha.figures.registry import draw_figure
 from icha.figures.select import NothingToDraw, branches, path_steps, select_runs
 from icha.figures.style import (
     BLACK,
@@ -194,8 +195,8 @@ def test_circles_continue_across_borders():
 def test_fig5_draws_measurements_over_the_curves(tmp_path):
     (tmp_path / "one.csv").write_text("p, a\n1, 0.2\n10, 2\n20, 4\n")
     (tmp_path / "other.csv").write_text("p, a\n1e-3, 3e-3\n1e-2, 3e-2\n2e-2, 5e-2\n")
-    measured = {"columns": {"p": 1e3, "a": 0.01}, "load_unit": 1e6, "material": "soft", "rms_slope": 0.2}
-    without_slope = {"columns": {"p": 1.0, "a": 1.0}, "load_unit": 1.0, "material": None, "rms_slope": None}
+    measured = {"columns": {"p": 1e3, "a": 0.01}, "contact_modulus": 5e6, "material": "soft", "rms_slope": 0.2}
+    without_slope = {"columns": {"p": 1.0, "a": 1.0}, "contact_modulus": None, "material": None, "rms_slope": None}
     left, right = fig5_multi_slope.figure(
         small.tree(),
         [tmp_path / "one.csv", tmp_path / "other.csv"],
@@ -209,6 +210,27 @@ def test_fig5_draws_measurements_over_the_curves(tmp_path):
     shifted = [line for line in left.get_lines() if len(line.get_xdata()) == 3]
     assert len(shifted) == 1
     np.testing.assert_allclose(shifted[0].get_xdata(), [2e-4, 2e-3, 4e-3])
+
+
+def test_fig5_contains_measurements_far_from_the_curves(tmp_path):
+    (tmp_path / "far.csv").write_text("p, a\n1e-3, 0.02\n1e-2, 0.3\n")
+    far = {"columns": {"p": 1.0, "a": 1.0}, "contact_modulus": None, "material": None, "rms_slope": None}
+    tables, measurements = [tmp_path / "far.csv"], [far | {"label": "far"}]
+    _, right = fig5_multi_slope.figure(small.tree(), tables, study="slopes", measurements=measurements).axes
+    low, high = right.get_ylim()
+    assert low < 20 and high > 30
+
+
+def test_the_caption_names_the_measurements_of_fig5(tmp_path):
+    (tmp_path / "one.csv").write_text("p, a\n1e-3, 0.02\n")
+    write_dataset(small.tree(), tmp_path / "small.nc")
+    known = {"columns": {"p": 1.0, "a": 1.0}, "contact_modulus": None, "material": None, "rms_slope": None}
+    measurements = [known | {"label": "rubber", "citation": "A. Author (2000)"}]
+    inputs = {"campaign": str(tmp_path / "small.nc"), "tables": [str(tmp_path / "one.csv")]}
+    files = [tmp_path / f"five.{ending}" for ending in ("png", "pdf", "txt")]
+    arguments = {"study": "slopes", "measurements": measurements}
+    draw_figure("fig5_multi_slope", *files, inputs=inputs, arguments=arguments, studies=["slopes"])
+    assert "Lines without markers are measurements: rubber (A. Author (2000))." in files[2].read_text()
 
 
 def test_values_that_the_campaign_lacks_are_named_with_those_it_has():

@@ -10,13 +10,15 @@ from icha.analysis.validity import statements_on_dataset
 from icha.datasets.campaign import campaign_tree
 from icha.datasets.labels import RunLabels
 from icha.figures import (
+    fig5_multi_slope,
+    fig7_stiffness,
     fig17_force_indentation,
     fig18_jkr_plot,
     fig19_work_of_adhesion,
     fig20_pressure_maps,
     select,
 )
-from icha.figures.captions import caption_of
+from icha.figures.captions import caption_of, texts_of
 from icha.figures.indenter_curves import select_series
 from icha.surfaces.shapes import Cone, Sphere
 
@@ -76,6 +78,33 @@ def test_works_of_adhesion_of_a_smooth_sphere_are_one(campaign):
     values = np.concatenate(at_zero)
     assert len(values) == 6  # each of three quantities as a seed and as a mean
     np.testing.assert_allclose(values, 1, atol=0.05)
+
+
+def test_fig5_draws_a_measurement_of_a_rough_sphere_where_the_run_is(tmp_path):
+    """The roughness has an rms slope of its own, so both are drawn at relative loads; panel (b) is A E*/F."""
+    run = press(rms=1e-8, energy=0.0)
+    campaign, at = tree_of(run), int(np.argmax(run["step_kind"].values == "indentation"))
+    pressure, area = (float(run[name][at]) for name in ("nominal_pressure", "contact_area_fraction"))
+    (tmp_path / "own.csv").write_text(f"p,a\n{pressure!r},{area!r}\n")
+    known = {"columns": {"p": 1.0, "a": 1.0}, "label": "own", "material": "soft", "rms_slope": None}
+    options = {"study": "press", "measurements": [known | {"contact_modulus": MODULUS}]}
+    figure = fig5_multi_slope.figure(campaign, [tmp_path / "own.csv"], **options)
+    for ax, value in zip(figure.axes, (area, area / pressure * MODULUS), strict=True):
+        assert ax.get_xlabel().startswith("relative load")
+        measured = [line for line in ax.get_lines() if line.get_label() == "own"]
+        np.testing.assert_allclose(measured[0].get_xydata(), [(pressure / MODULUS, value)])
+        drawn = [line for line in ax.get_lines() if line not in measured]
+        assert any(np.isclose(line.get_xydata(), measured[0].get_xydata()).all(axis=1).any() for line in drawn)
+    shown = texts_of(figure, {"campaign": campaign}, ["press"])
+    assert "relative loads F/(E* A0) take the place of reduced pressures" in caption_of("fig5_multi_slope", shown)
+
+
+def test_captions_state_the_units_of_shapes():
+    campaign = tree_of(press(energy=0.0))
+    shown = texts_of(fig7_stiffness.figure(campaign, study="press"), {"campaign": campaign}, ["press"])
+    assert "the units h_rms of gaps and h'rms of loads are not those of the roughness" in caption_of(
+        "fig7_stiffness", shown
+    )
 
 
 def test_maps_show_the_pressure_at_every_snapshot():
