@@ -8,6 +8,7 @@ left out for such reasons, no interval is stated, because intervals assume that 
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -15,6 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from icha.contact.models import MODELS
 from icha.datasets.labels import LABELS
 from icha.datasets.variables.campaign import (
     FAILED_CHECKS,
@@ -40,11 +42,12 @@ FAILED, NOT_FINISHED, NOT_COMPUTED = "failed a check", "did not finish", "not co
 NOT_REQUESTED, NOT_COMPARED = "not requested", "not compared"
 AVERAGED_APART = "averaged separately"
 LOSS_FAILED, ENDED_EARLY = "failed a check of the loss", "ended before this state"
+ENDED_FIRST = "ended before the first target"
 NOT_APPLICABLE, NOT_POSITIVE, INFINITE = "outside the range of the model", "without a positive value", "in full contact"
 _OF_STATUS = {INCOMPLETE: NOT_FINISHED, FAILED_CHECKS: FAILED, MISSING: NOT_COMPUTED}
 # Causes in the physics of a run, which depends on everything that was varied, and thus on the seed. Whether a run fails
 # in another way depends on a parameter if this parameter separates the failed runs from the others.
-_PHYSICS = (LOSS_FAILED, ENDED_EARLY, NOT_APPLICABLE, NOT_POSITIVE, INFINITE, AVERAGED_APART)
+_PHYSICS = (LOSS_FAILED, ENDED_EARLY, ENDED_FIRST, NOT_APPLICABLE, NOT_POSITIVE, INFINITE, AVERAGED_APART)
 
 
 class LeftOut(NamedTuple):
@@ -159,14 +162,19 @@ def causes_of_runs(runs: xr.Dataset, values: xr.DataArray | None = None, *, of_l
     Parameters
     ----------
     runs : study of a campaign dataset, or a part of it.
-    values : value of each run, with NaN where a run has none. None: every run that did not fail has a value.
+    values : value of each run, with NaN where a run has none. None: every run has a value that did not fail and that
+        reached its first target.
     of_loss : whether the values are losses, which runs with failed checks of the loss do not have.
     """
+    from icha.datasets.campaign import loading_stops  # imports xarray, which takes time
+
     status = runs["status"]
     causes = status.copy(data=np.full(status.shape, "", object))
     for number, cause in (_OF_STATUS | ({FAILED_LOSS: LOSS_FAILED} if of_loss else {})).items():
         causes = causes.where(status != number, cause)
-    if values is not None:
+    if values is None and "step_kind" in runs:
+        causes = causes.where((causes != "") | loading_stops(runs).any("step"), ENDED_FIRST)
+    elif values is not None:
         if "applicability" in runs:  # not in campaigns of earlier versions
             causes = causes.where((causes != "") | (runs["applicability"] == ""), NOT_APPLICABLE)
         causes = causes.where((causes != "") | values.notnull(), ENDED_EARLY)
@@ -177,6 +185,19 @@ def left_out_of_study(study: xr.Dataset, *, of_loss: bool = False) -> LeftOut:
     """Describe the runs of a study that failed or are missing, or that have no loss if `of_loss`."""
     causes = causes_of_runs(study, of_loss=of_loss).transpose(*LABELS).values.ravel()
     return find_left_out("runs", causes, varied_parameters(study, LABELS))
+
+
+def absent_materials(study: xr.Dataset) -> list[str]:
+    """Describe each model and material of a study whose runs all are left out, with causes and one reason."""
+    causes, found = causes_of_runs(study), []
+    for model, material in itertools.product(study["model"].values, study["material"].values):
+        at = {"model": study["model"].values == model, "material": study["material"].values == material}
+        left_out = find_left_out("runs", causes.isel(at).values.ravel())
+        if left_out.wanted and not left_out.used:
+            counted = ", ".join(f"{count} {cause}" for cause, count in left_out.causes.items())
+            reason = next(filter(None, study["failure"].isel(at).values.ravel().tolist()), "")
+            found.append(f"{material} with {MODELS[model].words} ({counted}{reason and f': {reason}'})")
+    return found
 
 
 def varied_parameters(runs: xr.Dataset, dims: Sequence[str]) -> dict[str, tuple[str, np.ndarray]]:

@@ -106,7 +106,7 @@ def count_runs(data: Mapping[str, object], studies: Sequence[str], shown: str = 
     studies : names of the studies whose runs the figure shows.
     shown : lines that tell what the figure shows, from `texts_of`.
     """
-    from icha.analysis.left_out import left_out_of_study
+    from icha.analysis.left_out import absent_materials, left_out_of_study
     from icha.analysis.sample_words import left_out_lines, sample_rows
     from icha.datasets.variables.campaign import LOADED_RUNS
 
@@ -124,6 +124,7 @@ def count_runs(data: Mapping[str, object], studies: Sequence[str], shown: str = 
                 f"The figure shows {left_out.words}{suffix}{biased}. Means over too few of the requested seeds have no "
                 "intervals. The report lists the reasons."
             )
+        found += [f"Without a curve{suffix}: {each}." for each in absent_materials(study)]
         if "applicability" in study:  # not in campaigns of earlier versions
             status = study["status"].transpose(*LABELS).values
             reasons = study["applicability"].transpose(*LABELS).values[np.isin(status, LOADED_RUNS)]

@@ -111,3 +111,13 @@ def test_captions_count_what_is_missing():
         "The figure shows 7 of 10 runs; 1 not computed, 1 did not finish, 1 failed a check. Means over too few of the "
         f"requested seeds have no intervals. The report lists the reasons. Note on 2 runs: {REASON}."
     )
+
+
+def test_captions_name_a_material_whose_runs_ended_before_their_first_target():
+    reason = "the path ends near full contact"
+    ended = [(labels, own.isel(step=slice(0, 0)).assign_attrs(beyond_model=reason)) for labels, own in small.runs()[:1]]
+    tree = campaign_tree([*ended, *small.runs()[1:2]])
+    assert "soft" not in legend(fig2_area_and_gap.figure(tree, study="slopes"))
+    caption = count_runs({"campaign": tree}, ["slopes"])
+    assert "The figure shows 1 of 2 runs; 1 ended before the first target" in caption
+    assert f"Without a curve: soft with asperities (1 ended before the first target: {reason})." in caption
