@@ -149,7 +149,8 @@ def _computed_files(campaign, results, files, sha256_of_run) -> Iterator[Item]:
         # The contact of a shape stays small, however sticky its roughness is.
         spreads = sweep["adhesive"] and campaign.surfaces[case.surface].shape is None
         ratio = energy_ratio(campaign, case) if spreads else math.inf
-        cost = run_cost(case.model, grid, summits(case.surface), energy_ratio=ratio, **sweep)
+        free = campaign.is_free(case.surface)
+        cost = run_cost(case.model, grid, summits(case.surface), energy_ratio=ratio, free=free, **sweep)
         part = f"study {case.study}" + (f", {MODELS[case.model].words}" if case.model != DEFAULT_MODEL else "")
         yield Item(part, "run", path, state, cost, costs.job_threads(grid), reason)
     for path in files.theories:
