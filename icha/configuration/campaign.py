@@ -287,7 +287,7 @@ class Campaign(Section):
         yield from self.figures.script_problems()
         for label, entry in self.measurements.items():
             try:
-                read_columns(entry.path, entry.columns, ratios=[entry.area.column])
+                read_columns(entry.path, entry.columns, entry.limits(self))
             except ValueError as error:
                 yield ("measurements", label, "path"), entry.path, str(error)
 

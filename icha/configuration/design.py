@@ -383,6 +383,11 @@ class _Variants:
                     reason = f"{key} of {base!r}: {wrong!r} {reason}" if key else f"{base!r}: {reason}"
                 self.problems.setdefault(location, (location, value, reason))
             return base
+        if "poisson_ratio" in changes and not variant.reads_poisson_ratio:
+            reason = f"has no effect, because {base!r} is a half-space with a given contact modulus; expected "
+            reason += "`youngs_modulus` instead of `contact_modulus`, or a layer with `thickness`. Or remove the key"
+            location, value = changes["poisson_ratio"]
+            self.problems.setdefault(location, (location, value, reason))
         if hasattr(variant, "path"):
             variant = variant.model_copy(update={"path": entries[base].path})
         name = "-".join([base, *([case] if case else (f"{key}{value_label(variant, key)}" for key in changes))])

@@ -1,15 +1,23 @@
 """Sections `figures` (one key for every figure) and `measurements` (measured contact areas for figure 5)."""
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Self
 
 from pydantic import ConfigDict, Field, create_model, model_validator
 
+from icha.asperity.full_contact import gaussian_complete_pressure
 from icha.figures.declaration import FigureOptions
 from icha.figures.own_figure import OwnFigure, caption_in, modules_of
 from icha.figures.registry import DECLARATIONS, figure_number
+from icha.support.formatting import format_quantity
+from icha.support.titles import contradicting_unit
 from icha.support.values import NOTHING, File, Name, Positive, Problem, Section, Text, conversion_factor, unknown
+
+# Reduced pressure at which contact without adhesion is complete, for a side of 10^6 shortest wavelengths. Surfaces with
+# fewer wavelengths are in full contact at smaller pressures.
+_FULL_CONTACT = gaussian_complete_pressure(1e6)
 
 
 def _factor(unit: str, si_unit: str) -> float | None:
@@ -26,7 +34,8 @@ class Column(Section):
     column: Text
     """Heading of the column."""
     unit: Annotated[str, Field(strict=True)]
-    """Unit of the numbers in the column: `1` or `percent` for ratios, a unit of pressure for nominal pressures."""
+    """Unit of the numbers in the column: `1` or `percent` for ratios, a unit of pressure for nominal pressures. If the
+    heading contains a unit, it must be the same unit."""
 
 
 class Measurement(Section):
@@ -71,7 +80,34 @@ class Measurement(Section):
             raise ValueError(f"area: the unit is {area!r}; expected '1' or 'percent'")
         if self.load_is_pressure and self.material is None:
             raise ValueError(f"load in {load!r} without material; expected this key, or the unit '1'")
+        for key, si_unit in (("load", "Pa" if self.load_is_pressure else "1"), ("area", "1")):
+            column = getattr(self, key)
+            if stated := contradicting_unit(column.column, column.unit, si_unit):
+                raise ValueError(
+                    f"{key}: the unit is {column.unit!r}, but the heading {column.column!r} states {stated!r}; "
+                    "expected the same unit. Correct `unit`, or the heading in the table and in `column`"
+                )
         return self
+
+    def _beside_shape(self, campaign):
+        """Return whether a surface of the study has a shape. Then figure 5 shows relative loads F/(E* A0)."""
+        return any(campaign.surfaces[name].shape for name in campaign.studies[self.study].surfaces)
+
+    def limits(self, campaign: Any) -> dict[str, tuple[float, str]]:
+        """Return the largest load and area in SI units, with texts for messages, by heading of the column."""
+        modulus = campaign.materials[self.material].contact_modulus if self.load_is_pressure else None
+        slope = self.rms_slope or math.nan  # without a limit if the slope is missing, which `problems` reports
+        if self._beside_shape(campaign):
+            most, reason = modulus or 1 / slope, "F/(E* A0) = 1, too large for linear elasticity"
+        else:
+            most = _FULL_CONTACT * (modulus * slope if modulus else 1.0)
+            reason = f"p/(E* h'rms) = {_FULL_CONTACT:.2g}, where every rough surface is in full contact"
+        load = format_quantity(most, "Pa") if modulus and most > 0 else f"{most:.3g}"
+        keys = "unit, material and rms_slope" if modulus else "unit"
+        return {
+            self.load.column: (most, f"{load} ({reason}); expected smaller loads. Correct {keys}"),
+            self.area.column: (1.0, "100 %; expected a fraction of the area. Check the unit of the column"),
+        }
 
     def problems(self, campaign: Any) -> Iterator[Problem]:
         """Yield a problem for each name that the campaign does not define, and for loads without a needed rms slope."""
@@ -79,8 +115,7 @@ class Measurement(Section):
         if self.material is not None:
             yield from unknown(("material",), self.material, campaign.materials)
         if self.rms_slope is None and self.study in campaign.studies:
-            # Figure 5 shows relative loads if a surface has a shape, and reduced pressures otherwise.
-            shaped = any(campaign.surfaces[name].shape for name in campaign.studies[self.study].surfaces)
+            shaped = self._beside_shape(campaign)
             if shaped != self.load_is_pressure:
                 loads = f"loads in {self.load.unit!r}" + (" beside a surface with a shape" if shaped else "")
                 yield ("rms_slope",), NOTHING, f"the key is missing; expected the measured rms slope, for {loads}"

@@ -117,6 +117,12 @@ class MaterialSection(Section):
     """Poisson ratio of the layer or of the body with `youngs_modulus`, from 0 to 0.5; rubber has nearly 0.5. Required
     with `thickness`. A half-space with a given E* does not depend on this ratio."""
 
+    @property
+    def reads_poisson_ratio(self) -> bool:
+        """Whether the key `poisson_ratio` changes results: by a layer, or by E* of a single elastic body."""
+        single = self.bodies is not None and sum(body is not None for body in self.bodies) == 1
+        return self.thickness is not None or self.youngs_modulus is not None or single
+
     @model_validator(mode="before")
     @classmethod
     def _combine_bodies(cls, content: Any) -> Any:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import codecs
 import csv
 import gzip
+import math
 import os
 import re
 import zlib
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 
 # A number with three digits after a comma. The comma may be a decimal sign, or it may separate thousands.
 AMBIGUOUS_COMMA = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}(?!\d)")
+# A number with one or several groups of three digits, such as 1.200 or 1,200,000.
+_GROUPED = re.compile(r"[-+]?[1-9]\d{0,2}(?:(?:\.\d{3})+|(?:,\d{3})+)")
 # A row of a table: the number of its line in the file, from 1, and its fields.
 Row = tuple[int, list[str]]
 
@@ -104,39 +107,82 @@ def check_lengths(rows: list[Row], expected: int) -> None:
 
 def is_number(field: str) -> bool:
     """Return whether a field is a number, with a decimal point or a decimal comma."""
-    try:
-        _number(field)
-    except ValueError:
-        return False
-    return True
+    for decimal in ".,":
+        try:
+            _number(field, decimal)
+        except ValueError:
+            continue
+        return True
+    return False
 
 
-def _number(field):
-    return float(field.replace(",", ".").replace("_", "?"))  # Python would read 1_000 as a thousand
+def _number(field, decimal):
+    """Convert a field with a known decimal sign; the other sign may separate groups of three digits."""
+    whole, sign, digits = field.partition(decimal)
+    if _GROUPED.fullmatch(whole):
+        whole = re.sub("[.,]", "", whole)
+    return float(f"{whole}{sign and '.'}{digits}".replace(",", "?").replace("_", "?"))  # Python would read 1_000
 
 
-def positive_numbers(rows: list[Row], column: int, name: str) -> np.ndarray:
-    """Return the numbers in a column, with decimal points or commas; raise ValueError if one is not positive."""
+def _decimal_sign(fields):
+    """Return the decimal sign of all fields of a table; raise ValueError if several signs are possible.
+
+    A sign is decimal if it is the last of two different signs, or if it occurs once in a number that is not of the form
+    1.200, where the sign may separate thousands.
+    """
+    signed = [field for field in fields if re.search("[.,]", field) and is_number(field)]
+    grouped = list(filter(_GROUPED.fullmatch, signed))
+    shown = {max(".,", key=field.rfind): field for field in signed if field not in grouped}
+    # A sign that occurs twice separates thousands, so the other sign is decimal.
+    shown |= {",."[field[-4] == ","]: field for field in grouped if len(field) > len("+100.000")}
+    if len(shown) == 2:
+        raise ValueError(
+            f"has numbers such as {' and '.join(shown.values())} with different decimal signs; expected "
+            "decimal points in all columns"
+        )
+    if shown or not signed:
+        return next(iter(shown), ".")
+    # Whole numbers below 1000 do not show whether 1.200 has a separator of thousands.
+    whole = [field for field in fields if re.fullmatch(r"[-+]?\d+", field)]
+    with_comma = [field for field in signed if "," in field]
+    if with_comma or (whole and all(len(field.lstrip("+-")) < 4 for field in whole)):
+        raise ValueError(
+            f"has numbers such as {(with_comma or signed)[0]}, whose {'comma' if with_comma else 'point'} may be "
+            "decimal or separate thousands; expected decimal points without separators of thousands. Write 1200, or "
+            "1.2000"
+        )
+    return "."
+
+
+def positive_numbers(rows: list[Row], columns: Mapping[int, str]) -> list[np.ndarray]:
+    """Return the numbers in some columns; raise ValueError if one is not positive.
+
+    The numbers of all these columns have the same decimal sign, a point or a comma.
+
+    Parameters
+    ----------
+    rows : rows of the table.
+    columns : name of each column for messages, by its index from 0.
+    """
     import numpy as np  # imported here because most commands read no table
 
-    fields = [row[column] for _, row in rows]
-    with_comma = [field for field in fields if "," in field]
-    if with_comma and all(map(AMBIGUOUS_COMMA.fullmatch, with_comma)):
-        raise ValueError(
-            f"has numbers such as {with_comma[0]} in column {name}, whose comma may be decimal or separate thousands; "
-            "expected decimal points"
-        )
-    numbers = []
-    for (line, _), field in zip(rows, fields, strict=True):
-        try:
-            numbers.append(POSITIVE.validate("", _number(field)))
-        except ValueError:
-            raise ValueError(f"column {name}, line {line}: {field[:40]!r}; expected a number greater than 0") from None
-    return np.array(numbers)
+    decimal = _decimal_sign([row[column] for _, row in rows for column in columns])
+    found = []
+    for column, name in columns.items():
+        numbers = []
+        for line, row in rows:
+            try:
+                numbers.append(POSITIVE.validate("", _number(row[column], decimal)))
+            except ValueError:
+                raise ValueError(
+                    f"column {name}, line {line}: {row[column][:40]!r}; expected a number greater than 0"
+                ) from None
+        found.append(np.array(numbers))
+    return found
 
 
 def read_columns(
-    path: str | os.PathLike, columns: Mapping[str, float], ratios: Collection[str] = ()
+    path: str | os.PathLike, columns: Mapping[str, float], limits: Mapping[str, tuple[float, str]] | None = None
 ) -> list[np.ndarray]:
     """Read columns of positive numbers from a table with a line of headings; return one array for each column.
 
@@ -144,29 +190,27 @@ def read_columns(
     ----------
     path : path of the file.
     columns : heading of each column to read, with the factor by which the numbers of this column are multiplied.
-    ratios : headings of the columns whose products are at most 1.
+    limits : largest product in a column, and a text for messages after "is more than", by heading.
 
     Raises
     ------
     ValueError
-        If the file cannot be read, a column is missing, a value is not a positive number, or a ratio exceeds 1.
+        If the file cannot be read, a column is missing, or a value is not a positive number or exceeds its limit.
     """
     rows, _ = read_rows(path)
     if len(rows) < 2:
         raise ValueError("contains no values; expected a CSV file with a line of headings and lines of numbers")
     (_, headings), *rows = rows
     check_lengths(rows, len(headings))
-    found = []
-    for heading, factor in columns.items():
+    for heading in columns:
         if headings.count(heading) != 1:
             reason = f"has {headings.count(heading) or 'no'} column{'s' * (heading in headings)} {heading!r}"
             raise ValueError(f"{reason}; expected one of {', '.join(headings)}")
-        values = positive_numbers(rows, headings.index(heading), repr(heading)) * factor
-        if heading in ratios and values.max() > 1 + 1e-9:
-            line, row = rows[int((values > 1 + 1e-9).argmax())]
-            raise ValueError(
-                f"column {heading!r}, line {line}: {row[headings.index(heading)]!r} is more than 100 %; expected a "
-                "fraction of the area. Check the unit of the column"
-            )
-        found.append(values)
+    found = positive_numbers(rows, {headings.index(heading): repr(heading) for heading in columns})
+    found = [values * factor for values, factor in zip(found, columns.values(), strict=True)]
+    for heading, values in zip(columns, found, strict=True):
+        most, text = (limits or {}).get(heading, (math.inf, ""))
+        if values.max() > most * (1 + 1e-9):
+            line, row = rows[int(values.argmax())]
+            raise ValueError(f"column {heading!r}, line {line}: {row[headings.index(heading)]!r} is more than {text}")
     return found

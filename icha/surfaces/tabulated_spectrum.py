@@ -6,7 +6,6 @@ import itertools
 import math
 import os
 import re
-import unicodedata
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -18,7 +17,7 @@ from scipy.special import gamma
 from icha.support.atomic_files import whole_file
 from icha.support.rules import LENGTH
 from icha.support.tables import check_lengths, is_number, positive_numbers, read_rows
-from icha.support.values import conversion_factor
+from icha.support.titles import bracketed_texts, power_of_length
 from icha.surfaces.moments import radial_power_spectrum
 from icha.surfaces.spectrum import IsotropicSpectrum
 from icha.surfaces.surface import Surface
@@ -207,7 +206,7 @@ def read_spectrum_table(
                 "length_unit", f"does not agree with the titles, which state {units.text}. Remove the key"
             )
         per_length, power_unit = stated
-    q, power = (positive_numbers(rows, column, str(column + 1)) for column in (0, 1))
+    q, power = positive_numbers(rows, {0: "1", 1: "2"})
     q, power = q * per_length * chosen.wave_factor, power * power_unit * chosen.power_factor
     if not (np.diff(q) > 0).all():
         raise ValueError("has wave numbers that do not increase from row to row; expected each once, sorted")
@@ -236,43 +235,37 @@ class _Units(NamedTuple):
     text: str
 
 
-_BRACKETS = re.compile(r"\(((?:[^()]|\([^()]*\))*)\)|\[([^\[\]]*)\]")
 _ANGLE = re.compile(r"(rad(?:ians?)?\b)|((?:cycles?|lines?)\b)")
-_LENGTH_POWER = re.compile(r"([^\W\d_]+)\s*(?:\^|\*\*)?\s*([-+]?\d+)?")
+_WAVELENGTH = re.compile(r"\W*(?:wave\s?length|lambda|λ)", re.IGNORECASE)
 
 
 def _units_of(words, remarks) -> _Units | None:
-    """Return the units in the titles above the numbers; None if there are none. Raises ValueError for unknown units."""
-    for row in [row for _, row in reversed(words)] or [remark.split() for remark in remarks[-1:]]:
+    """Return the units in the titles above the numbers; None if there are none. Raises ValueError for other titles."""
+    for row in [*(row for _, row in reversed(words)), *(remark.split() for remark in remarks[-1:])]:
         line = " ".join(row)
-        texts = [first or second for first, second in _BRACKETS.findall(line)] or row
+        texts = bracketed_texts(line) or row
+        if not 1 <= len(texts) <= 2 or (texts is row and None in map(power_of_length, row)):
+            # Units without brackets, such as q in rad/um, C in um^4.
+            tokens = re.sub(r"\b(rad|cycles)\s+", r"\1*", re.sub(r"\sin\s", " ", line)).split()
+            units = {token.strip(",;:"): found for token in tokens if (found := power_of_length(token))}
+            texts = list(units) if [exponent for _, exponent in units.values()][:-1] == [-1] else texts
         if not 1 <= len(texts) <= 2:
             continue
-        first, *others = (_power_of_length(text) for text in texts)
+        first, *others = (power_of_length(text) for text in texts)
         if first is not None and first[1] == -1 and None not in others:
             angle = next(("rad" if rad else "cycles" for rad, _ in _ANGLE.findall(texts[0])), "")
             power, exponent = others[0] if others and others[0] else (None, None)
             return _Units(first[0], angle, power, exponent, " and ".join(texts))
+        if _WAVELENGTH.match(line) or (first is not None and first[1] == 1 and texts is not row):
+            raise ValueError(
+                f"has the titles {line[:60]!r}, so the first column looks like a wavelength; expected wave numbers, "
+                "such as q (rad/um), C (um^4). Replace each wavelength by q = 2 pi/wavelength, and sort the rows by q"
+            )
         if re.search(r"/|\d", "".join(texts)):
             raise ValueError(
                 f"has the titles {line[:60]!r}; expected units of length in brackets, such as q (rad/um), C (um^4)"
             )
     return None
-
-
-def _power_of_length(text) -> tuple[float, int] | None:
-    """Return the factor and exponent of a power of a unit of length, such as rad/um or nm^2 um^2; None for others."""
-    plain = _ANGLE.sub("", unicodedata.normalize("NFKC", text)).translate({0x2212: "-", 0xB7: " ", 0x22C5: " "})
-    factor, total = 1.0, 0
-    for k, side in enumerate(plain.split("/")):
-        for name, exponent in _LENGTH_POWER.findall(side):
-            power = int(exponent or 1) * (-1 if k else 1)
-            try:
-                factor *= float(conversion_factor(name, "m")) ** power
-            except ValueError:
-                return None
-            total += power
-    return (factor, total) if total else None
 
 
 def merge_spectra(

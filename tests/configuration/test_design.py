@@ -184,6 +184,14 @@ def test_the_youngs_modulus_of_a_body_can_be_given_alone_varied_and_sampled(load
             load({"materials.soft.contact_modulus": None} | single | sample | wrong)
 
 
+def test_a_poisson_ratio_without_effect_is_not_varied(refused):
+    for changes in (
+        {"studies.one.vary": {"poisson_ratio": [0.3, 0.5]}},
+        {"studies.one.cases": [{"poisson_ratio": 0.3}]},
+    ):
+        refused(None, changes, "0.3 has no effect, because 'soft' is a half-space with a given contact modulus")
+
+
 LEVELS = {"asperities": "1..4", "coarse": [1, 2, 3], "fine": [1, 2]}
 ON_LEVELS = {"studies.one.seeds": None, "studies.one.rms_slopes": [0.5], "studies.one.levels": LEVELS}
 

@@ -29,13 +29,16 @@ def test_measurements(load, tmp_path):
 
 
 def test_beside_a_shape_pressures_need_no_slope_and_reduced_pressures_do(load, tmp_path):
-    (tmp_path / "points.csv").write_text("p, a\n10, 1\n")
+    (tmp_path / "points.csv").write_text("p, a\n1, 1\n")
     shape = {"surfaces.rough.shape": {"sphere": {"radius": "1 mm"}}}
     assert load(shape | {"measurements": {"lab": _measurement(rms_slope=None)}}).campaign.measurements
     reduced = _measurement(rms_slope=None, load={"column": "p", "unit": "1"})
     assert load({"measurements": {"lab": reduced}}).campaign.measurements
     with pytest.raises(ConfigurationError, match=r"lab\.rms_slope: the key is missing; .* beside a surface with"):
         load(shape | {"measurements": {"lab": reduced}})
+    too_large = _measurement(rms_slope=None, load={"column": "p", "unit": "GPa"})
+    with pytest.raises(ConfigurationError, match=r"'1' is more than 25 MPa \(F/\(E\* A0\) = 1"):
+        load(shape | {"measurements": {"lab": too_large}})
 
 
 @pytest.mark.parametrize(
@@ -53,7 +56,7 @@ def test_beside_a_shape_pressures_need_no_slope_and_reduced_pressures_do(load, t
 )
 def test_tables_as_spreadsheets_write_them(content, tmp_path):
     (tmp_path / "points.csv").write_bytes(content)
-    loads, areas = read_columns(tmp_path / "points.csv", {"p": 1e3, "a": 0.01}, ratios=["a"])
+    loads, areas = read_columns(tmp_path / "points.csv", {"p": 1e3, "a": 0.01}, {"a": (1.0, "100 %")})
     assert loads.tolist() == [1e4, 2e4] and areas.tolist() == [0.01, 0.025]
 
 
@@ -66,12 +69,16 @@ def test_tables_as_spreadsheets_write_them(content, tmp_path):
         ("p,a\n1,2,3\n", {}, "has 3 fields in line 2; expected 2"),
         ("p,a\n1,2\n\n3\n", {}, "has 1 fields in line 4; expected 2"),
         ("p,a\n0,8,0,12\n", {}, "decimal commas need semicolons"),
-        ("p;a\n1,234;2\n", {}, "1,234 in column 'p', whose comma may be decimal"),
+        ("p;a\n1,234;2\n", {}, "1,234, whose comma may be decimal"),
         ("p,a,a\n1,2,3\n", {}, "has 2 columns 'a'"),
         ("p,a\nkPa,%\n1,2\n", {}, "line 2: 'kPa'"),
         ("p,a\n1,2\n2,101\n", {}, "column 'a', line 3: '101' is more than 100 %"),
         ("p,a\n1,1.2\n", {"area": {"column": "a", "unit": "1"}}, "line 2: '1.2' is more than 100 %"),
         ("p,a\n1,1_0\n", {}, "'1_0'"),
+        ("p;a\n1.200;12\n2.400;37\n", {}, "1.200, whose point may be decimal or separate thousands"),
+        ("p;a\n1.5;0,12\n", {}, "1.5 and 0,12 with different decimal signs"),
+        ("p,a\n800,2\n90000,3\n", {}, "line 3: '90000' is more than 47.98 MPa"),
+        ("p,a\n0.8,2\n800,3\n", {"load": {"column": "p", "unit": "1"}}, "line 3: '800' is more than 3.84 (p/(E*"),
         ("p,a\n1,inf\n", {}, "number greater than 0"),
         ("p,a\n1,nan\n", {}, "number greater than 0"),
         ("p,a\n1,-2\n", {}, "number greater than 0"),
@@ -89,3 +96,55 @@ def test_measurements_that_cannot_be_drawn(table, changes, message, load, tmp_pa
     with pytest.raises(ConfigurationError, match=r"measurements\.lab") as error:
         load({"measurements": {"lab": _measurement(**changes)}})
     assert message in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("load_column", "load_unit", "area_column", "area_unit", "message"),
+    [
+        ("pressure (MPa)", "kPa", "area (%)", "percent", "load: the unit is 'kPa', but the heading 'pressure (MPa)'"),
+        ("pressure (MPa)", "MPa", "area (%)", "1", "area: the unit is '1', but the heading 'area (%)' states '%'"),
+        ("pressure", "kPa", "area [1]", "percent", "states '1'"),
+        ("pressure_MPa", "kPa", "area", "percent", "states 'MPa'"),
+        ("pressure / MPa", "kPa", "area", "percent", "states 'MPa'"),
+        ("KPa", "MPa", "area", "percent", "states 'KPa'"),
+        ("load (N)", "kPa", "area", "percent", "states 'N'"),
+        ("pressure (10^3 Pa)", "Pa", "area", "percent", "states 'Pa'"),
+        ("p_MPa_mean", "kPa", "area", "percent", "states 'MPa'"),
+        ("pressure (kPa)", "1", "area", "percent", "states 'kPa'"),
+        ("pressure", "kPa", "area (mm^2)", "percent", "states 'mm^2'"),
+        ("pressure (N/mm²)", "MPa", "A/A0 [%]", "percent", None),
+        ("p/(E* h'rms)", "1", "area fraction", "percent", None),
+        ("p_m", "kPa", "area (A)", "1", None),
+        ("p2 (kPa)", "kPa", "area_1", "percent", None),
+    ],
+)
+def test_units_in_headings_are_those_of_the_keys(
+    load_column, load_unit, area_column, area_unit, message, load, tmp_path
+):
+    (tmp_path / "points.csv").write_text(f"{load_column},{area_column}\n0.1,0.2\n", encoding="utf-8")
+    columns = {"load": {"column": load_column, "unit": load_unit}, "area": {"column": area_column, "unit": area_unit}}
+    changes = {"measurements": {"lab": _measurement(**columns)}}
+    if message is None:
+        assert load(changes).campaign.measurements
+        return
+    with pytest.raises(ConfigurationError, match=r"measurements\.lab") as error:
+        load(changes)
+    assert message in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("table", "loads", "areas"),
+    [
+        ("p;a\n1.200;0,12\n2.400;0,37\n", [1200, 2400], [0.12, 0.37]),
+        ('p,a\n"1,200",0.12\n"2,400",0.37\n', [1200, 2400], [0.12, 0.37]),
+        ("p;a\n1.200.000;0,125\n800;0,370\n", [1.2e6, 800], [0.125, 0.37]),
+        ("p;a\n1.200.000;1,125\n800;1,370\n", [1.2e6, 800], [1.125, 1.37]),
+        ("p;a\n1.234,5;12\n900;37\n", [1234.5, 900], [12, 37]),
+        ("p;a\n1.200;1.125\n2.400;2.375\n", [1.2, 2.4], [1.125, 2.375]),
+        ("p;a\n1.200;12\n1500;37\n", [1.2, 1500], [12, 37]),
+    ],
+)
+def test_one_decimal_sign_for_the_table(table, loads, areas, tmp_path):
+    (tmp_path / "points.csv").write_text(table)
+    found = read_columns(tmp_path / "points.csv", {"p": 1.0, "a": 1.0})
+    assert [each.tolist() for each in found] == [loads, areas]

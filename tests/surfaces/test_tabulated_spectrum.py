@@ -56,6 +56,9 @@ def test_a_table_is_written_and_read_in_any_unit_of_length(tmp_path):
         ("1,5,2\n2,5,1\n", "decimal commas need semicolons"),
         ("1,234;2\n2,345;1\n", "may be decimal or separate thousands"),
         ("q (1/px), C (px^4)\n1, 2\n2, 1\n", "expected units of length in brackets"),
+        ("lambda (um), C (um^4)\n1, 2\n2, 1\n", "the first column looks like a wavelength; expected wave numbers"),
+        ("wavelength;C\n1;2\n2;1\n", "the first column looks like a wavelength"),
+        ("1.200;12\n1.300;11\n", "may be decimal or separate thousands"),
     ],
 )
 def test_wrong_tables_are_refused(text, message, tmp_path):
@@ -78,6 +81,10 @@ ROWS = [f"{q:.9e};{power:.9e}" for q, power in zip(Q * 1e-6, TABLE.power * 1e24,
         ("q;C\nrad/um;um^2 um^2", "utf-8"),
         ("# q (rad/um)  C (um^4)", "utf-8"),
         ("wave number [µm⁻¹ rad];power", "utf-8"),
+        ("# q rad/um  C um^4", "utf-8"),
+        ("# q in rad/um, C in um^4\nq;C", "utf-8"),
+        ("q rad/um;C um^4", "utf-8"),
+        ("q / rad um^-1; C / um^4", "utf-8"),
     ],
 )
 @pytest.mark.parametrize("decimal", ".,")
