@@ -212,5 +212,7 @@ def read_columns(
         most, text = (limits or {}).get(heading, (math.inf, ""))
         if values.max() > most * (1 + 1e-9):
             line, row = rows[int(values.argmax())]
-            raise ValueError(f"column {heading!r}, line {line}: {row[headings.index(heading)]!r} is more than {text}")
+            field, number = row[headings.index(heading)], f"{values.max() / columns[heading]:.6g}"
+            shown = repr(field) if field == number else f"{field!r} (the number {number})"
+            raise ValueError(f"column {heading!r}, line {line}: {shown} is more than {text}")
     return found

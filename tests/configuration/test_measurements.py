@@ -78,6 +78,7 @@ def test_tables_as_spreadsheets_write_them(content, tmp_path):
         ("p;a\n1.200;12\n2.400;37\n", {}, "1.200, whose point may be decimal or separate thousands"),
         ("p;a\n1.5;0,12\n", {}, "1.5 and 0,12 with different decimal signs"),
         ("p,a\n800,2\n90000,3\n", {}, "line 3: '90000' is more than 47.98 MPa"),
+        ("p;a\n90.000;0,2\n800;3\n", {}, "line 2: '90.000' (the number 90000) is more than 47.98 MPa"),
         ("p,a\n0.8,2\n800,3\n", {"load": {"column": "p", "unit": "1"}}, "line 3: '800' is more than 3.84 (p/(E*"),
         ("p,a\n1,inf\n", {}, "number greater than 0"),
         ("p,a\n1,nan\n", {}, "number greater than 0"),
