@@ -323,8 +323,11 @@ def _validate_list(kind, values):
 
 
 def _validate_snapshots(snapshots, unload):
-    """Return the targets of all snapshots; raise `ValueError` if a value is out of range, repeated or never reached."""
-    saved: list[Target] = []
+    """Return the targets of all snapshots; raise `ValueError` if a value is out of range, repeated or never reached.
+
+    The targets are the keys of a dictionary, in the order of the snapshots, because there may be thousands.
+    """
+    saved: dict[Target, None] = {}
     for label, name, value in _label_pairs("snapshots", snapshots, (*QUANTITIES, *(UNLOADING + k for k in QUANTITIES))):
         kind = name.removeprefix(UNLOADING)
         target = Target(kind, _validate_value(label, kind, value), True, kind != name)
@@ -334,7 +337,7 @@ def _validate_snapshots(snapshots, unload):
             raise ValueError(
                 f"{label}: {value!r} is a state of unloading; expected `unload: true`, or unload=True in Python"
             )
-        saved.append(target)
+        saved[target] = None
     return saved
 
 
