@@ -48,15 +48,20 @@ def resolving_grid(material: Material, period: float) -> int:
 
 
 def one_asperity(
-    tabor_parameter: float, *, approaches: Sequence[float] = (3.0, 2.0, 1.0), period: float = 12.0
+    tabor_parameter: float,
+    *,
+    approaches: Sequence[float] = (3.0, 2.0, 1.0),
+    period: float = 12.0,
+    to_pull_off: bool = True,
 ) -> xr.Dataset:
     """Load an adhesive asperity and unload it, with the model and with boundary elements.
 
     Parameters
     ----------
     tabor_parameter : positive.
-    approaches : m, that is (dgamma^2 R/E*^2)^(1/3), falling. The approach at the pull-off force of the model is added.
+    approaches : m, that is (dgamma^2 R/E*^2)^(1/3), falling.
     period : of the cell, m.
+    to_pull_off : whether the approach at the pull-off force of the model is added.
 
     Returns
     -------
@@ -65,7 +70,7 @@ def one_asperity(
     """
     material = Material(1.0, 1.0, 1 / tabor_parameter)
     surface = paraboloid(resolving_grid(material, period), period)
-    all_approaches = (*approaches, pull_off_approach(JKR(material), period))
+    all_approaches = (*approaches, *([pull_off_approach(JKR(material), period)] if to_pull_off else []))
     tamaas = GapContact(refine(surface, material, 1), material, _TOLERANCE)
     states = (tamaas.solve(surface.heights.max() - approach) for approach in all_approaches)
     return _comparison(surface, material, states, len(approaches))

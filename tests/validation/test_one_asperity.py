@@ -55,7 +55,7 @@ def test_jkr_pull_off_force_agrees(adhesive):
 @pytest.mark.slow
 def test_area_of_zero_gap_agrees_within_three_percent_where_the_cohesive_zone_is_narrow():
     """This needs a larger Tabor parameter and a finer grid; the state is nearly free of load."""
-    narrow = one_asperity(5.0, approaches=(2.0,), period=8.0).isel(approach=slice(0, 1))
+    narrow = one_asperity(5.0, approaches=(2.0,), period=8.0, to_pull_off=False)
     for name in ("zero_gap_area_error", "zero_gap_area_error_at_load", "energetic_area_error", "force_error"):
         np.testing.assert_allclose(narrow[name], 0, atol=0.03)
 
