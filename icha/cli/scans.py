@@ -81,13 +81,10 @@ def _reading(scan, to_scale: bool) -> Iterator[str]:
 def _defects(scan, to_scale: bool) -> Iterator[str]:
     """Yield lines on outliers, offsets of scan lines and curvature: what was removed, or the keys that remove them."""
     defects, settings = scan.defects, scan.settings
-    if defects.outliers:
-        count = format_count(defects.outliers, "outlier")
-        size = f"the largest {defects.largest:.3g} rms heights from the points around"
-        if settings.outliers == "remove":
-            yield f"{count} replaced, {size}"
-        else:
-            yield f"warning: {count}, {size}; `outliers: remove` replaces outliers"
+    if found := defects.description_of_outliers:
+        removed = found.replace(",", " replaced,", 1)
+        keep = f"warning: {found}; `outliers: remove` replaces outliers"
+        yield removed if settings.outliers == "remove" else keep
     for levelling, step in defects.offsets.items():
         size = f" of {formatting.length(float(f'{step:.2g}'))} rms" if to_scale else ""
         where = f"the lines along {'x' if levelling == 'lines' else 'y'}"

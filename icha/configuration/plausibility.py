@@ -85,6 +85,8 @@ def unusual_topography(location: tuple, section: Any, period: float, rms_slope: 
         yield Unusual((*location, "size"), formatting.length(period), SIDE, " in the file")
     if rms_slope is not None and not RMS_SLOPE.contains(rms_slope):
         source = " (the slope depends on units, size and numbers for missing points)"
+        if outliers := _kept_outliers(section):
+            source = f" (with {outliers}; try `outliers: remove` first)"
         yield Unusual((*location, "height_unit"), f"rms slope {rms_slope:.3g}", RMS_SLOPE, source)
 
 
@@ -127,11 +129,23 @@ def coarse_grids(campaign: Campaign) -> Iterator[Unusual]:
         if hasattr(section, "cutoff"):
             filtered = formatting.length(float(f"{RECOMMENDED_CELLS * campaign.period(name) / grid:.2g}"))
             expected += f", or `cutoff: {filtered}`" if section.cutoff is None else ", or a longer `cutoff`"
+        if outliers := _kept_outliers(section):
+            expected = f"`outliers: remove` first, because the scan has {outliers}"
         reason = " on half the grid" if name in halves else f" of variant {name}" if origin != name else ""
         source = f" ({resolution}{reason})"
         value = getattr(campaign.surfaces[origin], key) or grid
         found[origin] = resolution.cells, Unusual(("surfaces", origin, key), value, expected, source)
     yield from (unusual for _, unusual in found.values())
+
+
+def _kept_outliers(section):
+    """Describe the outliers that a surface keeps; an empty text without outliers."""
+    if getattr(section, "outliers", "remove") == "remove":
+        return ""
+    from icha.configuration.topographies import read_topography
+    from icha.surfaces.measured.topography import defects_of
+
+    return defects_of(read_topography(section).square).description_of_outliers
 
 
 def coarse_contacts(campaign: Campaign) -> Iterator[Unusual]:

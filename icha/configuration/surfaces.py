@@ -164,13 +164,13 @@ def _unit_of_length(value: Any) -> float:
     return _length(value, expected) if is_multiple else _length(f"1 {value}", expected)
 
 
-def _sides(value: Any) -> tuple[float, float]:
-    """Return the sides of a scan along x and y, m, from one length or a list of two lengths."""
-    sides = value if isinstance(value, list | tuple) else [value, value]
+def _sides(value: Any) -> tuple[float, ...]:
+    """Return the sides of a scan, m: one length of a square, or two lengths along x and y."""
+    several = isinstance(value, list | tuple)
     expected = "expected one length, such as '90 um', or a list of two lengths, along x and y"
-    if len(sides) != 2:
-        raise ValueError(f"has {len(sides)} entries; {expected}")
-    return _length(sides[0], expected), _length(sides[1], expected)
+    if several and len(value) != 2:
+        raise ValueError(f"has {len(value)} entries; {expected}")
+    return tuple(_length(each, expected) for each in (value if several else [value]))
 
 
 def _length(value: Any, expected: str) -> float:
@@ -189,7 +189,7 @@ UnitOfLength = Annotated[
 Position = quantity(FloatRange("m", least=0), "20 um")
 _LENGTH_SCHEMA = {"type": "string", "pattern": PATTERN, "examples": ["90 um"]}
 _SIDES_SCHEMA = {"anyOf": [_LENGTH_SCHEMA, {"type": "array", "items": _LENGTH_SCHEMA, "minItems": 2, "maxItems": 2}]}
-Sides = Annotated[tuple[float, float], BeforeValidator(_sides), WithJsonSchema(_SIDES_SCHEMA)]
+Sides = Annotated[tuple[float, ...], BeforeValidator(_sides), WithJsonSchema(_SIDES_SCHEMA)]
 
 
 class Crop(Section):
@@ -288,9 +288,9 @@ class MeasuredSurface(_SurfaceFromFile):
     """Unit of the coordinates x and y; with `format: fourier`, unit of 1/q. Default: the unit in the file. Required
     if the file contains coordinates without a unit, and `size` is not given."""
     size: Sides | None = None
-    """Size of the whole scan: one length, or a list of two lengths, along x and y. The size of a pixel is the size of
-    the scan divided by the number of pixels. Required if the file does not contain the size. This key replaces the size
-    in the file."""
+    """Size of the whole scan: one length if the scan is square, or a list of two lengths, along x and y. The size of a
+    pixel is the size of the scan divided by the number of pixels. Required if the file does not contain the size. This
+    key replaces the size in the file."""
     touches_first: Literal["high", "low"] = "high"
     """Points that touch the elastic body first: the points with the largest (`high`) or the smallest (`low`) numbers in
     the file."""
@@ -351,6 +351,7 @@ class MeasuredSurface(_SurfaceFromFile):
         """Arguments of `icha.surfaces.measured.settings.Preparation`, in SI units: all keys of the preparation."""
         settings = self.model_dump(exclude={"kind", "path", "shape"})
         settings["detrend"] = self.detrend or ("none" if self.boundary == "periodic" else "tilt")
+        settings["size"] = self.size and (self.size[0], self.size[-1])
         settings["taper"] = (self.taper or 0.1) if self.boundary == "window" else None
         if self.cutoff is None:
             # Settings without this key have the same checksums as in earlier versions, so old results remain valid.

@@ -19,6 +19,7 @@ from icha.support.checksums import sha256_of
 from icha.support.values import NOTHING, Problem
 
 if TYPE_CHECKING:
+    from icha.surfaces.measured.topography import PreparedTopography
     from icha.surfaces.surface import Surface
     from icha.surfaces.tabulated_spectrum import TabulatedSpectrum
 
@@ -79,6 +80,13 @@ def inspect_file(section: MeasuredSurface | FileSurface | SpectrumSurface) -> To
     return _KNOWN[key]
 
 
+def read_topography(section: MeasuredSurface) -> PreparedTopography:
+    """Read and prepare a measured topography; its size may be one length only if the scan is square."""
+    from icha.surfaces.measured.topography import prepared_topography
+
+    return prepared_topography(section.path, section.preparation | {"size": section.size})
+
+
 def read_surface(section: MeasuredSurface | FileSurface | SpectrumSurface, seed: int = 1) -> Surface:
     """Read a surface from a file, and prepare the surface with the keys of its section.
 
@@ -88,10 +96,7 @@ def read_surface(section: MeasuredSurface | FileSurface | SpectrumSurface, seed:
     """
     # The modules below import SciPy, which takes time; campaigns without surfaces from files do not need SciPy.
     if isinstance(section, MeasuredSurface):
-        from icha.surfaces.measured.topography import prepared_topography
-
-        surface = prepared_topography(section.path, section.preparation).surface
-        return _with_shape(surface, section)
+        return _with_shape(read_topography(section).surface, section)
     from icha.surfaces.surface import Surface
 
     if isinstance(section, SpectrumSurface):
@@ -140,10 +145,16 @@ def read_scan(path: str | os.PathLike, *, confirmed: Collection[str] = (), **key
     ConfigurationError
         If a key is missing or wrong, if the file cannot be read or prepared with these keys, or if an unusual size or
         slope is not confirmed. A ConfigurationError is also a ValueError.
+
+    Warns
+    -----
+    IchaWarning
+        If opposite edges of a periodic surface do not fit, or if outliers are kept.
     """
     from icha.configuration.plausibility import plausibility_problems, unusual_topography, unusual_values
     from icha.support.usual import IchaWarning
     from icha.surfaces.measured.settings import UnfitTopography
+    from icha.surfaces.measured.topography import defects_of
     from icha.surfaces.surface import MISFIT_OF_EDGES, edges_fit
 
     def unconfirmed(unusual):
@@ -154,7 +165,8 @@ def read_scan(path: str | os.PathLike, *, confirmed: Collection[str] = (), **key
     try:
         measured = MeasuredSurface.model_validate(section)
         refuse("read_scan", unconfirmed(unusual_values({"surfaces": {"scan": section}})))
-        surface = read_surface(measured)
+        topography = read_topography(measured)
+        surface = _with_shape(topography.surface, measured)
     except ValidationError as error:
         problems = [{**details, "loc": ("surfaces", "scan", "measured", *details["loc"])} for details in error.errors()]
         refuse("read_scan", [(location[2:], value, reason) for location, value, reason in map(problem_of, problems)])
@@ -164,4 +176,6 @@ def read_scan(path: str | os.PathLike, *, confirmed: Collection[str] = (), **key
     refuse("read_scan", unconfirmed(unusual))
     if not surface.free and not edges_fit(surface.heights):
         warnings.warn(MISFIT_OF_EDGES, IchaWarning, stacklevel=2)
+    if measured.outliers == "keep" and (text := defects_of(topography.square).description_of_outliers):
+        warnings.warn(f"{text}; `outliers: remove` replaces outliers", IchaWarning, stacklevel=2)
     return surface

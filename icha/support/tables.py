@@ -50,14 +50,16 @@ def open_text(path: Path) -> TextIO:
 
 
 def split_fields(line: str, delimiter: str) -> list[str]:
-    """Split a line at blanks (delimiter " ") or at another delimiter into fields without quotes and outer blanks."""
+    """Split a line at blanks (delimiter " ") or at another delimiter into fields without outer quotes and blanks."""
     if delimiter == " ":
         fields = line.split()
     elif '"' in line:
         fields = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
     else:
         fields = line.split(delimiter)
-    return [field.strip(' "\t') for field in fields]
+    if '"' in line:
+        fields = [re.sub(r'^\s*"([^"]*)"\s*$', r"\1", field) for field in fields]
+    return [field.strip(" \t") for field in fields]
 
 
 def read_rows(path: str | os.PathLike) -> tuple[list[Row], list[str]]:

@@ -64,6 +64,32 @@ def test_implausible_scans_need_to_be_confirmed(file, keys, key):
         assert icha.read_scan(file, **KEYS | keys, boundary="window", confirmed=[key]).rms_slope > 5
 
 
+@pytest.mark.filterwarnings("error")
+def test_outliers_are_warned_about(tmp_path):
+    heights = rough(cells=16) * 1e9
+    heights[20, 30] = 32767
+    np.save(tmp_path / "scan.npy", heights)
+    with pytest.raises(ValueError, match=r"1 outlier, the largest .*; try `outliers: remove` first"):
+        icha.read_scan(tmp_path / "scan.npy", **KEYS, boundary="window")
+    heights[20, 30] = -9999
+    np.save(tmp_path / "scan.npy", heights)
+    with pytest.warns(icha.IchaWarning, match="^1 outlier, the largest .* `outliers: remove` replaces outliers"):
+        icha.read_scan(tmp_path / "scan.npy", **KEYS, boundary="window")
+    icha.read_scan(tmp_path / "scan.npy", **KEYS, boundary="window", outliers="remove")
+
+
+@pytest.mark.filterwarnings("error")
+def test_one_length_is_the_size_of_a_square(tmp_path):
+    np.save(tmp_path / "scan.npy", rough()[:48] * 1e9)
+    keys = {"height_unit": "nm", "boundary": "free"}
+    for size, pixel in (("10 um", "156.25 nm x 208.333 nm"), (["7.5 um", "10 um"], "117.188 nm x 208.333 nm")):
+        with pytest.raises(ValueError, match=rf"size: .* makes pixels of {pixel}; .*\[10 um, 7.5 um\].*`first_axis`"):
+            icha.read_scan(tmp_path / "scan.npy", size=size, **keys)
+    assert icha.read_scan(tmp_path / "scan.npy", size=["7.5 um", "10 um"], first_axis="x", **keys).grid == 48
+    for size in (["10 um", "7.5 um"], ["10 um", "10 um"]):
+        icha.read_scan(tmp_path / "scan.npy", size=size, **keys)
+
+
 def test_importing_the_package_loads_no_reader():
     script = "import icha, sys; print(not {'numpy', 'pydantic', 'h5py', 'SurfaceTopography'} & set(sys.modules))"
     assert subprocess.run([sys.executable, "-c", script], capture_output=True, text=True).stdout.strip() == "True"

@@ -162,6 +162,15 @@ def test_hdf5(tmp_path, first_axis, stored):
     assert_read(scan(path, size=SIZE, first_axis=first_axis, data="scans/first"))
 
 
+@pytest.mark.parametrize("name", ["scale", "gain", "z_scale", "ScaleFactor"])
+def test_attributes_that_may_be_factors_are_asked_about(tmp_path, name):
+    with h5py.File(tmp_path / "scan.h5", "w") as file:
+        file.create_dataset("z", data=HEIGHTS).attrs.update({name: 0.1, "unit": "nm"})
+    with refused("height_unit", f"'{name}: 0.1', which may be a factor of the heights"):
+        scan(tmp_path / "scan.h5", size=SIZE)
+    assert_read(scan(tmp_path / "scan.h5", size=SIZE, height_unit=0.1 * NM), 0.1 * NM)
+
+
 @pytest.mark.parametrize("fill", ["_FillValue", "missing_value", "fillvalue"])
 @pytest.mark.parametrize("scale", [{}, {"scale_factor": 0.5, "add_offset": 3.0}])
 def test_hdf5_packed_as_netcdf(tmp_path, fill, scale):

@@ -11,7 +11,7 @@ from icha.surfaces.measured.settings import UnfitTopography
 DELIMITERS, ENCODINGS = (",", ";", "\t", " "), ("utf-8", "utf-8-sig", "utf-16", "cp1252")
 WORDS = ("", "nan", "NaN", "BAD", "none", "-", "***", "#N/A", "1.#QNAN", "no data")
 # Headings that state nothing of use, or what is not enough for the size of a scan.
-USELESS = ("Samples: 4", "Operator: N. N.", "Width: 20 um", "Gain: 3", "Date: 2026-01-01", "Pixel: 512", "Rate: 1 Hz")
+USELESS = ("Samples: 4", "Operator: N. N.", "Width: 20 um", "I gain: 3", "Date: 2026-01-01", "Pixel: 512", "Rate: 1 Hz")
 
 
 def heights_of(random, rows, columns):

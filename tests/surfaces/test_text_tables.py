@@ -242,6 +242,33 @@ def test_commas_before_three_digits_are_ambiguous(tmp_path, delimiter):
     assert_heights(read(written(tmp_path, text(decimal("{:.3f}", HEIGHTS + 1e4), delimiter))))
 
 
+@pytest.mark.parametrize(("delimiter", "offset"), [(";", 5000), ("\t", 1000)])
+def test_points_before_three_digits_may_separate_thousands(tmp_path, delimiter, offset):
+    integers = rows(HEIGHTS + offset, lambda height: f"{height:,.0f}".replace(",", "."))
+    with refused("path", "that may separate thousands.*add a digit"):
+        read(written(tmp_path, text(integers, delimiter)))
+
+
+def test_decimal_points_before_three_digits_are_not_asked_about(tmp_path):
+    for heights, delimiter in ((HEIGHTS, ";"), (HEIGHTS + 500, "\t"), (HEIGHTS / 1000 + 500, ",")):
+        assert read(written(tmp_path, text(rows(heights), delimiter))).surface.grid == GRID
+    fields = rows(HEIGHTS + 500)
+    fields[3][4] += "0"
+    assert_heights(read(written(tmp_path, text(fields, ";"))))
+    # Numbers of nodes along x and y are integers in columns of their own.
+    lines = [[f"{k % GRID}", f"{k // GRID}", f"{height:.3f}"] for k, height in enumerate(HEIGHTS.ravel() + 500)]
+    assert_heights(read(written(tmp_path, text(lines, "\t"), "scan.xyz"), size=None, lateral_unit=0.5 * UM))
+
+
+@pytest.mark.parametrize("entry", ["Z scale: 0.5 nm/LSB", "Z-scale factor = 2.5", "Height gain [V]: 3", "Scaling\t0,1"])
+def test_factors_of_heights_in_headings_are_asked_about(tmp_path, entry):
+    path = written(tmp_path, text(rows(), " ", [entry, "Zoom factor: 2", "X scale: 3 um", "Z unit: nm"]), "scan.txt")
+    with refused("height_unit", "may be a factor of the heights"):
+        read(path, height_unit=None)
+    assert "not applied: " in read(path).reading
+    assert_heights(read(written(tmp_path, text(rows(), " ", ["Z scale: 1.0", "Z unit: nm"])), height_unit=None))
+
+
 def test_a_size_with_three_digits_behind_a_comma_is_ambiguous(tmp_path):
     heading = ["# Channel: Z", "# Width: 1,250 um", "# Height: 1,250 um", "# Value units: nm"]
     path = written(tmp_path, text(rows(), " ", heading), "scan.txt")
@@ -338,10 +365,16 @@ def test_zygo_integers_are_refused(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("said", "stored"), [("-3.4028234663852886e+38", "-3.402823e+38"), ("-9999.000", "-9999"), (None, "-9999")]
+    ("said", "stored"),
+    [
+        ("NODATA_value -3.4028234663852886e+38", "-3.402823e+38"),
+        ("NODATA_value -9999.000", "-9999"),
+        ("Invalid: 32767", "32767"),
+        ("", "-9999"),
+    ],
 )
 def test_missing_values_agree_to_the_digits_that_are_written(tmp_path, said, stored):
-    heading = ["ncols 24", "nrows 24", "cellsize 500"] + ([f"NODATA_value {said}"] if said else [])
+    heading = ["ncols 24", "nrows 24", "cellsize 500", said]
     fields = rows()
     fields[3][4] = stored
     assert_heights(read(written(tmp_path, text(fields, " ", heading), "scan.asc")), missing=1)
@@ -356,6 +389,7 @@ def test_what_is_wrong_with_a_file_is_named(tmp_path):
         (labelled.encode(), "'L0' in line 1, column 1"),
         (below_heading.encode(), "'xxx' in line 3"),
         (text(rows()).replace("\n", "]\n").encode(), r"\]' in line 1, column 24"),
+        (text(rows()).replace("\n", '"\n', 1).encode(), "\"' in line 1, column 24"),
     ):
         (tmp_path / "scan.txt").write_bytes(damaged)
         with refused("path", words):
@@ -366,15 +400,32 @@ def test_what_is_wrong_with_a_file_is_named(tmp_path):
 
 @pytest.mark.parametrize(
     ("heading", "order"),
-    [("x [um],y [um],z [nm]", (0, 1, 2)), ("Y(um),X(um),Z(nm)", (1, 0, 2)), ("z [nm],x [um],y [um]", (2, 0, 1))],
+    [
+        ("x [um],y [um],z [nm]", (0, 1, 2)),
+        ("Y(um),X(um),Z(nm)", (1, 0, 2)),
+        ("z [nm],x [um],y [um]", (2, 0, 1)),
+        ("X/um,Y/um,z_nm", (0, 1, 2)),
+        ("Y;X;Z\n[um];[um];[nm]", (1, 0, 2)),
+        ("X Y Z\n[um] [um] [nm]", (0, 1, 2)),
+    ],
 )
 def test_titles_of_columns_give_their_order_and_units(tmp_path, heading, order):
     lines = [[line[k] for k in order] for line in points()]
-    path = written(tmp_path, text(lines, ",", [heading]))
+    delimiter = next((sign for sign in ";," if sign in heading), " ")
+    path = written(tmp_path, text(lines, delimiter, [heading]))
     for unit in (None, NM):
         assert_heights(read(path, height_unit=unit, size=None))
     wide = read(path, size=None, lateral_unit=2 * UM)
     np.testing.assert_allclose(wide.surface.period, 2 * SIDE)
+
+
+def test_units_in_titles_may_differ_and_count_for_given_columns(tmp_path):
+    lines = [[f"{float(x) / 1000:.4f}", y, z] for x, y, z in points()]
+    path = written(tmp_path, text(lines, ",", ["x [mm],y [um],z [nm]"]))
+    assert_heights(read(path, height_unit=None, size=None))
+    assert_heights(read(path))
+    path = written(tmp_path, text(lines, ",", ["along [mm],across [um],depth [nm]"]))
+    assert_heights(read(path, height_unit=None, size=None, columns=(1, 2, 3)))
 
 
 def test_what_is_given_instead_of_what_the_file_says_is_printed(tmp_path):
@@ -406,7 +457,7 @@ def test_measurements_of_a_contact_are_no_topography(tmp_path, titles):
         read(written(tmp_path, text(lines, ",", [titles])))
 
 
-@pytest.mark.parametrize("titles", ["row,col,z", "x_um,y_um,z_nm"])
+@pytest.mark.parametrize("titles", ["row,col,z", "x_1,y_1,z_raw"])
 def test_titles_that_are_not_known_are_asked_about(tmp_path, titles):
     path = written(tmp_path, text(points(), ",", [titles]))
     with refused("columns", f"the columns are {titles.replace(',', ', ')}; expected"):

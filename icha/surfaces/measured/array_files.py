@@ -21,6 +21,7 @@ from icha.surfaces.measured.settings import (
     Preparation,
     UnfitTopography,
     metres_of,
+    unused_factors,
 )
 
 # Memory for reading an array: this number of copies of the array, with 8 bytes per number.
@@ -141,10 +142,10 @@ def read_netcdf(source, settings: Preparation) -> FileContent:
             side, decreases = _side(file.variables.get(dimension), heights.shape[axis])
             sides.append(side)
             heights = np.flip(heights, axis) if decreases else heights
-        unit = _unit_of(chosen.__dict__)
+        unit, remark = _unit_of(chosen.__dict__), _unused_factors(chosen.__dict__, settings)
     axes = "".join(dimensions).lower()
     size = tuple(sides[::-1]) if all(sides) else None
-    return FileContent(heights, unit, size, first_axis=axes[0] if axes in ("xy", "yx") else "", data=data)
+    return FileContent(heights, unit, size, None, axes[0] if axes in ("xy", "yx") else "", "", remark, data)
 
 
 def _is_real(variable) -> bool:
@@ -190,8 +191,8 @@ def read_hdf5(source, settings: Preparation) -> FileContent:
         heights = _unpack(chosen).reshape(chosen.shape[-2:])
         if source.path.suffix.lower() == ".mat" or "MATLAB_class" in chosen.attrs:
             heights = heights.T
-        unit = _unit_of(chosen.attrs)
-    return FileContent(heights, unit, data=data)
+        unit, remark = _unit_of(chosen.attrs), _unused_factors({**chosen.parent.attrs, **chosen.attrs}, settings)
+    return FileContent(heights, unit, remark=remark, data=data)
 
 
 def _unpack(dataset):
@@ -251,6 +252,12 @@ def _unit_of(attributes):
     if isinstance(text, bytes):
         text = text.decode("utf-8", "replace")
     return None if text is None else metres_of(text)
+
+
+def _unused_factors(attributes, settings):
+    """Return the attributes that may be factors of the heights; those of netCDF have been applied."""
+    entries = {name: str(value).strip("[]") for name, value in attributes.items() if name != "scale_factor"}
+    return unused_factors(entries.items(), settings)
 
 
 def open_instrument(path: Path):

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import binary_dilation, binary_erosion, label, mean, median_filter
 
+from icha.support.formatting import format_count
+
 # A point is an outlier if its height differs from the median of the 5 x 5 points around it by more than
 # `_OF_NEIGHBOURS` times the usual difference, and by more than `_OF_HEIGHTS` times the usual height.
 _WINDOW, _OF_NEIGHBOURS, _OF_HEIGHTS = 5, 10.0, 4.0
@@ -40,6 +42,12 @@ class Defects:
     largest: float
     offsets: dict[str, float]
     curvature: float
+
+    @property
+    def description_of_outliers(self) -> str:
+        """Number and size of the outliers; an empty text without outliers."""
+        size = f"the largest {self.largest:.3g} rms heights from the points around"
+        return f"{format_count(self.outliers, 'outlier')}, {size}" if self.outliers else ""
 
 
 def robust_deviation(values: np.ndarray) -> float:

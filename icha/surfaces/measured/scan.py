@@ -1,6 +1,7 @@
 """Read a scan from a file of any supported format: heights and size in metres."""
 
 import importlib
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -84,7 +85,19 @@ def load_scan(path: Path, settings: Preparation) -> Scan:
     unit = settings.height_unit or found.unit
     if unit is None:
         raise _missing("height_unit", "the unit of the heights; expected a unit such as 'um'")
+    rows, columns = found.heights.shape
     size = settings.size or found.size
+    if settings.size is not None:
+        x, y = size = settings.size[0], settings.size[-1]
+        square, exchanged = (math.isclose(a * rows, b * columns, rel_tol=_PROPORTIONS) for a, b in ((x, y), (y, x)))
+        one_length = len(settings.size) == 1 and rows != columns
+        if found.coordinates is None and (one_length or (exchanged and not square)):
+            lengths = ", ".join(map(formatting.length, (y, x) if exchanged else (x, x * rows / columns)))
+            raise UnfitTopography(
+                "size",
+                f"makes pixels of {formatting.length(x / columns)} x {formatting.length(y / rows)}; expected two "
+                f"lengths along x and y, [{lengths}] for square pixels, or the other `first_axis`",
+            )
     if size is None and found.coordinates is not None:
         if settings.lateral_unit is None:
             raise _missing(
@@ -102,11 +115,10 @@ def load_scan(path: Path, settings: Preparation) -> Scan:
     if size is None:
         raise _missing("size", "the size of the scan; expected a length such as '90 um'")
     replaced = []
-    if settings.size and found.size and not np.allclose(settings.size, found.size, rtol=1e-3, atol=0):
+    if settings.size and found.size and not np.allclose(size, found.size, rtol=1e-3, atol=0):
         replaced.append(f"the size {' x '.join(map(formatting.length, found.size))}")
     if settings.height_unit and found.unit and not np.isclose(settings.height_unit, found.unit, rtol=1e-3, atol=0):
         replaced.append(f"the unit of heights {formatting.length(found.unit)}")
-    rows, columns = found.heights.shape
     pixel = f"{formatting.length(size[0] / columns)} x {formatting.length(size[1] / rows)}"
     reading = [
         f"{name}, {rows} rows x {columns} columns of points"

@@ -1,6 +1,7 @@
 """Settings of a measured topography, the content of its file, and functions that several readers use."""
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,13 @@ WINDOW, MIRROR = "window", "mirror"
 LINE_SCAN = "is a line scan, one profile of {} points; expected a topography, with heights over x and y"
 # Coordinates count as equal if their difference, divided by the range of the coordinates, is at most this value.
 _ROUNDING = 1e-6
+# Names of factors: of heights, or of nothing in particular. Zoom and feedback gains are settings of the instrument.
+_FACTOR = re.compile(
+    r"(?<![a-z])(?:z(?!oom)|heights?|höhe|values?|data|vertical).*"
+    r"(?:s[ck]al|fa[ck]tor|gain|resolution|multiplier|sensitivity|calib)"
+    r"|lsb|\A(?:(?:conversion|s[ck]al(?:e|ing|ierung)|fa[ck]tor|multiplier|gain)[\s_]*)+\Z",
+    re.IGNORECASE,
+)
 # Largest distance of a coordinate from its grid line, divided by the distance of the grid lines.
 OFF_GRID = 0.05
 
@@ -39,7 +47,7 @@ class Preparation:
     first_axis : "y" or "x", the first axis of arrays whose dimensions have no names.
     height_unit : unit of the heights, m; None for the unit in the file.
     lateral_unit : unit of the coordinates, m; None for the unit in the file.
-    size : sides (x, y) of the whole scan, m; None for the size in the file.
+    size : sides (x, y) of the whole scan, m, or one length for equal sides; None for the size in the file.
     touches_first : "high" or "low": points with high or with low numbers touch the elastic body first.
     missing : treatment of points without a height, "refuse" or "fill".
     crop : x, y and side (m) of the square to cut out; None for the largest square in the middle of the scan.
@@ -59,7 +67,7 @@ class Preparation:
     first_axis: str = "y"
     height_unit: float | None = None
     lateral_unit: float | None = None
-    size: tuple[float, float] | None = None
+    size: tuple[float, ...] | None = None
     touches_first: str = "high"
     missing: str = "refuse"
     crop: Mapping[str, float] | None = None
@@ -120,6 +128,25 @@ def grid_indices(values: np.ndarray, axis: str) -> tuple[np.ndarray, int, float]
         f"does not allow coordinates {axis} that are not on a regular grid of at most {GRID.most} points; expected "
         "interpolate, or a file with rows and columns of points",
     )
+
+
+def unused_factors(entries: Iterable[tuple[str, ...]], settings: Preparation) -> str:
+    """Return the entries (name, value, …) of a file that may be factors of its heights, which ICHA does not apply.
+
+    Raises UnfitTopography if there are such entries and `height_unit` is not given.
+    """
+    found = [
+        f"{name}: {value}"
+        for name, value, *_ in entries
+        if _FACTOR.search(name) and re.search(r"\d", value) and not re.fullmatch(r"1([.,]0*)?", value)
+    ]
+    if found and settings.height_unit is None:
+        raise UnfitTopography(
+            "height_unit",
+            f"is missing, and the file states {', '.join(found)!r}, which may be a factor of the heights; expected the "
+            "unit of the numbers in the file, such as '0.5 nm' with a factor, or 'nm' if the factor is already applied",
+        )
+    return f"not applied: {', '.join(found)}" if found else ""
 
 
 def metres_of(unit: str) -> float | None:

@@ -18,13 +18,14 @@ from icha.surfaces.measured.settings import (
     UnfitTopography,
     grid_indices,
     metres_of,
+    unused_factors,
 )
 from icha.surfaces.measured.text_tables import Layout, SourceFile, refuse_coordinates, strip_remark
 
 # Fewest columns of a table with a row of heights in every line.
 _FEWEST_COLUMNS = 8
-# Title of a column: its name and, in brackets, its unit.
-_TITLE = re.compile(r"([a-z]+)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?", re.IGNORECASE)
+# Title of a column: its name and its unit, in brackets or after a sign.
+_TITLE = re.compile(r"(.*?)\s*(?:[\[(]\s*([^\])]*?)\s*[\])]|[/_]\s*([^\W\d_]+))?")
 _NAMES_OF_Z = ("z", "h", "height")
 # Words in the titles of tables that are no topographies, such as measurements of contact.
 _QUANTITIES = re.compile(r"load|force|radius|area|pressure|displacement|indentation|approach|time", re.IGNORECASE)
@@ -46,7 +47,7 @@ _NUMBER = r"([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)"
 # One length or two, such as 12 µm x 12 µm.
 _LENGTHS = re.compile(rf"{_NUMBER}\s*(\S+?)?(?:\s*[x×*]\s*{_NUMBER}\s*(\S+)?)?$")
 # A line of the heading: a name, then a colon, an equals sign, a delimiter or blanks, then a value.
-_ENTRY = re.compile(r"^[#%/\s'_]*([^\W\d_](?:[^\W\d]|[ ./()-])*?)\s*(?:[:：=,;\t]\s*|\s+(?=[-+]?\d))(.+?)[\s',;]*$")
+_ENTRY = re.compile(r"^[#%/\s'_]*([^\W\d_](?:[^\W\d]|[ ./()\[\]-])*?)\s*(?:[:：=,;\t]\s*|\s+(?=[-+]?\d))(.+?)[\s',;]*$")
 # Meaning of the names in a heading, in small letters and without punctuation. The words of Gwyddion for width, height,
 # value units and lateral units are those of its languages (msgid in its files po/*.po).
 _NAMES = {
@@ -62,7 +63,8 @@ _NAMES = {
     "pixel": "pixel|pixel size|pixel spacing|point spacing|spacing|cell size|cellsize|xy calibration|xy justierung",
     "rows": "nrows|rows|lines|number of rows|number of lines|vertical|vertikal",
     "columns": "ncols|cols|columns|number of columns|horizontal|horizont",
-    "missing": "nodata value|nodata|no data value|missing value|bad value|missing data value",
+    "missing": "nodata value|nodata|no data value|missing value|missing data value|bad value|bad data|invalid"
+    "|invalid value|invalid data|invalid height|void value|null value|fill value|fillvalue",
 }
 _MEANINGS = {name: meaning for meaning, names in _NAMES.items() for name in names.split("|")}
 # Number for a missing height in grids by ESRI, if the heading does not define another number.
@@ -106,7 +108,8 @@ def read_matrix(file: SourceFile, settings: Preparation) -> FileContent:
                 "Remove these delimiters, or write nan for missing heights",
             )
     size, coordinates = heading.find_size(heights.shape, settings)
-    return FileContent(heading.mark_missing(heights), heading.find_height_unit(settings), size, coordinates)
+    remark, unit = unused_factors(heading.entries, settings), heading.find_height_unit(settings)
+    return FileContent(heading.mark_missing(heights), unit, size, coordinates, remark=remark)
 
 
 def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
@@ -153,14 +156,16 @@ def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
     x_unit, y_unit, z_unit = (metres_of(units[column - 1]) if units else None for column in columns)
     lateral_unit = heading.find_lateral_unit(settings)
     x_unit, y_unit = x_unit or lateral_unit, y_unit or lateral_unit
-    remark = "columns x {}, y {}, z {} by their names".format(*columns)
+    named = "columns x {}, y {}, z {} by their names".format(*columns)
+    remarks = named if titled and columns != sorted(columns) else "", unused_factors(heading.entries, settings)
+    size = (nx * dx * x_unit, ny * dy * y_unit) if x_unit and y_unit and settings.lateral_unit is None else None
     return FileContent(
         heights.reshape(ny, nx),
         z_unit or heading.find_height_unit(settings),
-        (nx * dx * x_unit, ny * dy * y_unit) if x_unit and y_unit and settings.lateral_unit is None else None,
-        (nx * dx, ny * dy),
+        size,
+        size or (nx * dx, ny * dy),
         "y",
-        remark="; ".join(filter(None, (remark if titled and columns != sorted(columns) else "", scattered))),
+        remark="; ".join(filter(None, (*remarks, scattered))),
     )
 
 
@@ -186,21 +191,27 @@ def _interpolate(points):
 
 
 def _find_titles(layout):
-    """Return the words in the last line above the numbers, one for each column; an empty list without titles."""
-    last = layout.heading[-1] if layout.heading else ""
-    delimiters = r"[,;\t]" if layout.delimiter != " " else r"[,;]\s*|\s+(?![\[(])"
-    words = [word.strip(" \"'") for word in re.split(delimiters, last.strip(' \t\r\n,;#%"'))]
-    return words if len(words) == layout.columns and not re.search("[:=]", last) else []
+    """Return the words above the numbers, one for each column, and units in a line of their own; [] without titles."""
+    delimiters = r"[,;\t]" if layout.delimiter != " " else r"[,;]\s*|(?<=[\])])\s+|\s+(?![\[(])"
+    names, last = (
+        [word.strip(" \"'") for word in re.split(delimiters, line.strip(' \t\r\n,;#%"')) if not re.search("[:=]", line)]
+        for line in ("", "", *layout.heading)[-2:]
+    )
+    units = [word.strip("[]()") for word in last]
+    if len(names) == len(last) and sum(metres_of(unit) is not None for unit in units) > 2:
+        last = [f"{name} [{unit}]" for name, unit in zip(names, units, strict=True)]
+    return last if len(last) == layout.columns else []
 
 
 def _read_titles(titles):
     """Return the column (from 1) of each axis x, y and z, if each occurs exactly once, and the units of all columns."""
     found = [_TITLE.fullmatch(title) for title in titles]
-    names = [match[1].lower() if match else "" for match in found]
+    units = [match[2] or match[3] or "" for match in found if match]
+    # A word after a sign is part of the name if it is not a unit, as in z_raw.
+    names = [match[1 if match[3] is None or metres_of(match[3]) else 0].lower() for match in found if match]
     names = ["z" if name in _NAMES_OF_Z else name for name in names]
-    if any(names.count(axis) != 1 for axis in "xyz"):
-        return [], [""] * len(titles)
-    return [names.index(axis) + 1 for axis in "xyz"], [(match and match[2]) or "" for match in found]
+    unique = all(names.count(axis) == 1 for axis in "xyz")
+    return [names.index(axis) + 1 for axis in "xyz"] if unique else [], units
 
 
 def _ask_for_columns(count, titles):
@@ -364,7 +375,7 @@ def _not_waves(problem):
 def _wave_numbers(q, settings):
     """Return integer wave vectors, (n, 2) array, in units of 2 pi/period; integers in the file have this unit."""
     largest = np.max(np.abs(q))
-    if settings.size is not None and settings.size[0] != settings.size[1]:
+    if settings.size is not None and len(set(settings.size)) > 1:
         raise UnfitTopography("size", "has different sides, but a Fourier series needs a square; expected one length")
     if np.all(q == np.rint(q)):
         if settings.size is None:

@@ -26,6 +26,9 @@ _REMARK = re.compile(r"(?<!1\.)#(?!N/A|NA\b|VALUE!|NUM!|DIV/0!|NULL!|REF!)", re.
 # The exponent of a number in double precision, as Fortran writes it, such as 1.5D-3.
 _FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[-+]?\d)")
 _PLAIN = frozenset("0123456789+-.eE,; \t")
+# A number with a point that may separate thousands; an integer below a thousand, and one without separator.
+_AMBIGUOUS_POINT = re.compile(r"[-+]?[1-9]\d{0,2}\.\d{3}")
+_BELOW_THOUSAND, _PLAIN_THOUSANDS = re.compile(r"[-+]?\d{1,3}"), re.compile(r"[-+]?\d{4,}")
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+([eE][-+]?\d+)?")
 # A number, with any separator of thousands.
 _LIKE_A_NUMBER = re.compile(r"[-+]?\d[\d.,' ]*")
@@ -293,9 +296,27 @@ def _is_row(text, delimiter, width):
 def _find_decimal_sign(first, rows, delimiter):
     """Find the decimal sign from the `first` line of numbers, and the fields of all rows.
 
-    Raises UnfitTopography if commas may be decimal signs, delimiters, or separators of thousands.
+    Raises UnfitTopography if commas may be decimal signs, delimiters, or separators of thousands, or if points seem to
+    separate thousands. A leading zero, or another number of digits, shows that points are decimal signs.
     """
     fields = [field for row in rows for field in row]
+    with_point = [field for field in fields if "." in field]
+    columns = itertools.zip_longest(*rows, fillvalue="")
+    if (
+        with_point
+        and all(map(_AMBIGUOUS_POINT.fullmatch, with_point))
+        and not any(map(_PLAIN_THOUSANDS.fullmatch, fields))
+        # Semicolons avoid decimal commas. Decimals are not mixed with integers; of both signs, few are all above 1.
+        and (
+            (delimiter == ";" and len({field[0] == "-" for field in with_point}) == 1)
+            or any("." in "".join(c) and any(map(_BELOW_THOUSAND.fullmatch, c)) for c in columns)
+        )
+    ):
+        raise UnfitTopography(
+            "path",
+            f"has points, as in {with_point[0]!r}, that may separate thousands: each has three digits after it. Remove "
+            f"the points if so; if they are decimal signs, add a digit to one number, as in '{with_point[0]}0'",
+        )
     with_comma = [field for field in fields if "," in field]
     numbers = re.split(r",?\s+", first.strip())
     if (
@@ -308,7 +329,7 @@ def _find_decimal_sign(first, rows, delimiter):
             f"has commas, as in {(with_comma or [first])[0][:40]!r}, that may be decimal signs, delimiters, or "
             "separate thousands; expected decimal points. Replace or remove the commas",
         )
-    return "," if with_comma and not any("." in field for field in fields) else "."
+    return "," if with_comma and not with_point else "."
 
 
 def _are_halves_of_decimals(rows):
