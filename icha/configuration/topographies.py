@@ -16,6 +16,7 @@ from icha.configuration.errors import problem_of, refuse
 from icha.configuration.studies import MEASURED
 from icha.configuration.surfaces import FileSurface, MeasuredSurface, SpectrumSurface
 from icha.support.checksums import sha256_of
+from icha.support.usual import IchaWarning
 from icha.support.values import NOTHING, Problem
 
 if TYPE_CHECKING:
@@ -100,7 +101,10 @@ def read_surface(section: MeasuredSurface | FileSurface | SpectrumSurface, seed:
     from icha.surfaces.surface import Surface
 
     if isinstance(section, SpectrumSurface):
-        surface = _spectrum(section).realise(section.grid, seed, section.amplitudes)
+        with warnings.catch_warnings():
+            # The configuration asks about coarse grids itself.
+            warnings.simplefilter("ignore", IchaWarning)
+            surface = _spectrum(section).realise(section.grid, seed, section.amplitudes)
         return _with_shape(replace(surface, boundary="free") if section.free else surface, section)
     from icha.surfaces.measured.scan import read_height_map
 
@@ -152,7 +156,6 @@ def read_scan(path: str | os.PathLike, *, confirmed: Collection[str] = (), **key
         If opposite edges of a periodic surface do not fit, or if outliers are kept.
     """
     from icha.configuration.plausibility import plausibility_problems, unusual_topography, unusual_values
-    from icha.support.usual import IchaWarning
     from icha.surfaces.measured.settings import UnfitTopography
     from icha.surfaces.measured.topography import defects_of
     from icha.surfaces.surface import MISFIT_OF_EDGES, edges_fit

@@ -16,6 +16,7 @@ import scipy.fft
 
 from icha.support.parallel import blocks, on_cores
 from icha.support.rules import GRID, HURST, LENGTH, SEED, SLOPE
+from icha.support.usual import IchaWarning
 from icha.surfaces.resolution import LEAST_CELLS, NYQUIST_CELLS, Resolution
 from icha.surfaces.surface import Surface
 
@@ -100,7 +101,8 @@ class IsotropicSpectrum:
             least = resolution.grid_of(grid, NYQUIST_CELLS)
             raise ValueError(f"grid: {grid} nodes give {resolution}; expected at least {least} nodes")
         if not resolution.reaches(LEAST_CELLS):
-            warnings.warn(f"grid: {grid} nodes give {resolution}; expected {resolution.grids(grid)}", stacklevel=2)
+            text = f"grid: {grid} nodes give {resolution}; expected {resolution.grids(grid)}"
+            warnings.warn(text, IchaWarning, stacklevel=2)
         kx, ky, k, inside = self._band
         random = np.random.Generator(np.random.PCG64(seed)).random((inside.size, 2))[inside]
         size = np.sqrt(self.plateau * self._shape(k)) * (2 * np.pi / self.period)
