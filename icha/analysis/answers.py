@@ -1,6 +1,7 @@
 """The answers of a campaign in words: each estimate with its interval, what limits it, and what would narrow it."""
 
 import math
+import re
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -36,7 +37,8 @@ _LEVELS = {
     "fine_seeds": "boundary elements",
 }
 _STOPS = {"reduced_pressure": "p*", "relative_load": "p/E*", "area_fraction": "A/A0"}
-# If the half-width divided by the value is larger, the interval need not be symmetric, and its ends are printed.
+# Largest ratio of half-width and absolute value of an interval that is printed with ±. Wider intervals need not be
+# symmetric, so their ends are printed.
 _WIDE = 0.3
 
 
@@ -87,7 +89,7 @@ class Answer(NamedTuple):
             return f"{self.value:.3g}{unit}"
         digits = self._digits
         interval = f" ± {self.half_width:.{digits}f}{unit}"
-        if self.half_width > _WIDE * self.value:
+        if self.half_width > _WIDE * abs(self.value):
             interval = f", from {self.low:.{digits}f} to {self.high:.{digits}f}{unit}"
         return f"{self.value:.{digits}f}{unit}{interval}"
 
@@ -134,7 +136,7 @@ def _answer(row: xr.Dataset) -> Answer:
         float(row["estimate_low"]) * factor,
         float(row["estimate_high"]) * factor,
         unit,
-        {name: share * value * factor for name, share in causes.items()},
+        {name: share * abs(value) * factor for name, share in causes.items()},
         "".join(f"; {note}" for note in notes if note),
         _limit(row, shares),
     )
@@ -226,7 +228,9 @@ def as_latex(answers: xr.DataTree) -> Iterator[str]:
         yield r"\begin{tabular}{llll}"
         yield r"\toprule contact & state & quantity & estimate \\ \midrule"
         for each in answers_of(node.to_dataset()):
-            number = f"{each.estimate}{each.note}".replace("%", r"\%").replace("±", r"$\pm$")
+            # A hyphen in text mode would look shorter than a minus sign; exponents such as 1e-05 stay.
+            estimate = re.sub(r"(?<!e)-", "$-$", each.estimate)
+            number = f"{estimate}{each.note}".replace("%", r"\%").replace("±", r"$\pm$")
             cells = [text.replace("_", r"\_").replace("'", "$'$") for text in (each.contact, each.state, each.quantity)]
             yield " & ".join([*cells, number]) + r" \\"
         yield r"\bottomrule"

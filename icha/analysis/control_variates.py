@@ -70,7 +70,7 @@ class QuantityEstimate(NamedTuple):
     Attributes
     ----------
     value : mean; the geometric mean if `logarithmic`.
-    relative : estimate of the mean, with half-widths relative to the value.
+    relative : estimate of the mean, with half-widths relative to the absolute value.
     logarithmic : whether logarithms were averaged.
     """
 
@@ -78,17 +78,24 @@ class QuantityEstimate(NamedTuple):
     relative: Estimate
     logarithmic: bool
 
-    def interval(self, half_width: float) -> tuple[float, float]:
-        """Return the ends of the interval with a relative half-width; values of one sign keep their sign."""
+    def interval(self, half_width: float, *, signed: bool = False) -> tuple[float, float]:
+        """Return the lower and the upper end of the interval.
+
+        Parameters
+        ----------
+        half_width : half-width of the interval, relative to the absolute value of the mean.
+        signed : True if the quantity may be negative; otherwise the interval of a positive mean ends at zero.
+        """
         if self.logarithmic:
             return self.value * math.exp(-half_width), self.value * math.exp(half_width)
-        return self.value * max(0.0, 1 - half_width), self.value * (1 + half_width)
+        low, high = self.value - abs(self.value) * half_width, self.value + abs(self.value) * half_width
+        return (low if signed else max(low, min(self.value, 0.0))), high
 
 
 def estimate_quantity(
     asperities: Mapping[int, float], coarse: Mapping[int, float], fine: Mapping[int, float]
 ) -> QuantityEstimate | None:
-    """Estimate the mean over seeds of a positive quantity on the fine grid; arguments are those of `estimate_mean`."""
+    """Estimate the mean over seeds of a quantity on the fine grid; arguments are those of `estimate_mean`."""
     levels = asperities, coarse, fine
     first = np.array(list((asperities or coarse or fine).values()))
     every = [value for level in levels for value in level.values()]

@@ -23,7 +23,7 @@ from icha.datasets.campaign import loading_stops
 from icha.datasets.labels import LABELS, coarse_study, inputs_study, is_derived_study, slopes_at
 from icha.datasets.variables.answers import ANSWERS
 from icha.datasets.variables.run import OF_LOSS
-from icha.path.targets import ESTIMATED_AT_TARGETS, ESTIMATED_OF_LOOPS, OF_SQUARES
+from icha.path.targets import ESTIMATED_AT_TARGETS, ESTIMATED_OF_LOOPS, OF_SQUARES, SIGNED
 
 LOOP = "loop"
 
@@ -121,7 +121,8 @@ def _estimate(quantity, mean, share_inputs, has_interval):
         nothing += ("share_grid", "asperity_coefficient", "degrees_of_freedom")
         return dict.fromkeys(nothing, math.nan) | {"geometric": 0}
     found = mean.relative
-    low, high = mean.interval(math.hypot(found.half_width, 0.0 if math.isnan(share_inputs) else share_inputs))
+    half_width = math.hypot(found.half_width, 0.0 if math.isnan(share_inputs) else share_inputs)
+    low, high = mean.interval(half_width, signed=quantity in SIGNED)
     if quantity == "contact_area_fraction":
         high = min(high, 1.0)
     return {

@@ -14,7 +14,7 @@ import numpy as np
 
 from icha.datasets.labels import LABELS, slopes_of
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
-from icha.figures.select import has_shape
+from icha.figures.select import has_shape, lacks_sphere
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -53,8 +53,8 @@ def texts_of(figure: Figure, data: Mapping[str, object], studies: Sequence[str])
 
     Words are the names of the `data`, and words for the `studies` that are shown: materials that are `bare`, `adhesive`
     or `with and without adhesion`; `several surfaces`, `several slopes`, `bare at several slopes`, `adhesive at several
-    slopes`, `one seed`, `periodic` surfaces, `units of a shape`; boundary elements with which the model was compared,
-    `in the limit` or `at finite range`.
+    slopes`, `one seed`, `periodic` surfaces, `units of a shape`, runs `without a sphere`; boundary elements with
+    which the model was compared, `in the limit` or `at finite range`.
     """
     from matplotlib.text import Text
 
@@ -75,6 +75,7 @@ def texts_of(figure: Figure, data: Mapping[str, object], studies: Sequence[str])
             "one seed": study.sizes["seed"] == 1,
             "units of a shape": has_units and has_shape(study),
             "periodic": (study["boundary"] == "periodic").any(),
+            "without a sphere": lacks_sphere(study),
         }
         words += [word for word, holds in conditions.items() if holds]
     compared = data["model_error"].children.values() if "model_error" in data else ()

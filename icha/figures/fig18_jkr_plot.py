@@ -33,13 +33,14 @@ def figure(campaign: xr.DataTree, *, study: str) -> Figure:
     """Draw a^(3/2)/R against F/a^(3/2) for loading and unloading, with the fitted JKR lines.
 
     The equation of JKR, F = 4 E* a^3/(3 R) - sqrt(8 pi E* w a^3), is the straight line y = 3 (x + sqrt(8 pi E* w))/(4
-    E*) with x = F/a^(3/2) and y = a^(3/2)/R.
+    E*) with x = F/a^(3/2) and y = a^(3/2)/R. Runs without a radius R and runs on a layer are left out.
     """
     from icha.references.indenter_runs import first_approach, last_retraction, spaced_states
 
-    series = select_series(campaign, study)
-    sphere = sphere_of(first_run(series))
-    if sphere is None or not sphere[2]:
+    # The runs of a series have the same shape and material.
+    spheres = [(each, sphere_of(first_run([each]))) for each in select_series(campaign, study)]
+    series = [each for each, sphere in spheres if sphere]
+    if not any(sphere and sphere[2] for _, sphere in spheres):
         raise NothingToDraw(f"study {study}: no sphere with adhesion; the figure needs a radius and a surface energy")
     states_of = {"approach": first_approach, "retraction": last_retraction}
     drawn = []

@@ -113,6 +113,12 @@ def has_shape(study: xr.Dataset) -> bool:
     return "shape" in study and bool((study["shape"] != "").any())
 
 
+def lacks_sphere(study: xr.Dataset) -> bool:
+    """Return whether a study has surfaces without the radius of a sphere, or layers of finite thickness."""
+    radius, thickness = study.get("shape_radius"), study.get("layer_thickness")
+    return radius is None or bool(radius.isnull().any()) or bool(thickness is not None and np.isfinite(thickness).any())
+
+
 def is_applicable(run: xr.Dataset) -> bool:
     """Return False if a run states a reason why the asperity model is not applicable, otherwise True."""
     return not run.attrs.get("applicability")

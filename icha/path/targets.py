@@ -129,6 +129,8 @@ OF_SQUARES = (
 )
 ESTIMATED_AT_TARGETS |= {"contact_radius": AREAS, "stiffness": (), "force": LOADS}
 ESTIMATED_OF_LOOPS += tuple(name for name in OF_SQUARES if name not in ESTIMATED_AT_TARGETS)
+# Estimated quantities that may be negative: the load of a contact with adhesion may be a tension.
+SIGNED = ("nominal_pressure", "force")
 # Kind of the target of an equilibrium between the targets of a path. The value of this target is the mean separation.
 BETWEEN = "path"
 # Beginning of the kind of a snapshot on the last unloading, such as "unloading_force".

@@ -193,3 +193,39 @@ def test_the_largest_cause_is_named(answers):
     assert "29 % narrower" in limit(seeds=0.09, grid=0.0)
     assert "2 seeds of boundary elements limit" in limit(refinement=0.09, grid=0.0, seeds=0.01)
     assert "The error of the grid is unknown." in limit(seeds=0.09, grid=math.nan)
+
+
+def test_tensile_forces_have_their_lower_end_first(answers):
+    """Texts and the table for LaTeX state a mean force of -58 µN as one of 58 µN, but with a sign."""
+
+    def force(low, high):
+        values = {"quantity": "force", "units": "N", "estimate": -58e-6, "estimate_low": low, "estimate_high": high}
+        values |= {"share_seeds": 0.2, "share_grid": math.nan}
+        row = answers["one"].to_dataset().isel(answer=[0])
+        return row.assign({name: ("answer", [value]) for name, value in values.items()})
+
+    narrow = force(-70e-6, -46e-6)
+    (answer,) = answers_of(narrow)
+    assert answer.estimate == "-58 µN ± 12 µN"
+    assert answer.shares["seeds"] == pytest.approx(11.6)
+    assert answers_of(force(-84e-6, -32e-6))[0].estimate == "-58 µN, from -84 to -32 µN"
+    (line,) = (line for line in as_latex(xr.DataTree.from_dict({"/one": narrow})) if "force" in line)
+    assert r"$-$58 µN $\pm$ 12 µN" in line
+
+
+def test_only_intervals_of_loads_pass_zero():
+    labels = RunLabels("pull", "boundary_elements", "rough", 1, 1.0, "soft")
+    run = cyclic.unloaded(small.run(seed=1, material="soft")).assign_attrs(contact_model=labels.model)
+    factors = {1: -1.0, 2: 0.5, 3: 2.0}  # the loads of seed 1 are tensile
+    names = "nominal_pressure", "contact_stiffness"
+    tree = campaign_tree(
+        (labels._replace(seed=seed), run.assign({name: run[name] * factor for name in names}))
+        for seed, factor in factors.items()
+    )
+    study = estimate_campaign(tree)["pull"].to_dataset()
+    pressure, stiffness = (study.isel(answer=np.flatnonzero(study["quantity"] == name)[0]) for name in names)
+    assert pressure["estimate"] > 0 > pressure["estimate_low"]
+    assert pressure["estimate"] - pressure["estimate_low"] == pytest.approx(
+        float(pressure["estimate_high"] - pressure["estimate"])
+    )
+    assert stiffness["estimate_low"] == 0

@@ -20,7 +20,7 @@ from icha.figures import (
 )
 from icha.figures.captions import caption_of, texts_of
 from icha.figures.indenter_curves import select_series
-from icha.surfaces.shapes import Cone, Sphere
+from icha.surfaces.shapes import Cone, CylinderPunch, Sphere
 
 SIDE, GRID, MODULUS, RADIUS = 48e-6, 48, 1e6, 1e-3
 ENERGY = (4e-6) ** 3 * MODULUS / RADIUS**2
@@ -70,6 +70,21 @@ def test_states_of_a_smooth_sphere_are_on_the_line_of_jkr(campaign):
     texts = [text.get_text() for text in fig.legends[0].get_texts()]
     assert any(text.startswith("smooth: loading ") for text in texts)
     assert any(text.startswith("rms height 10 nm: loading ") for text in texts)
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0)])
+def test_the_line_of_jkr_leaves_out_shapes_without_a_radius(order):
+    runs = press(), press(shape=CylinderPunch(1e-5)), press(shape=Cone(1.56))
+    several, alone = tree_of(*(runs[k] for k in order)), tree_of(runs[0])
+    fig, only = (fig18_jkr_plot.figure(tree, study="press") for tree in (several, alone))
+    for ax, expected in zip(fig.axes, only.axes, strict=True):
+        for line, other in zip(lines(ax), lines(expected), strict=True):
+            np.testing.assert_allclose(line, other)
+    captions = [
+        caption_of("fig18_jkr_plot", texts_of(drawn, {"campaign": tree}, ["press"]))
+        for drawn, tree in ((fig, several), (only, alone))
+    ]
+    assert ["without a radius" in caption for caption in captions] == [True, False]
 
 
 def test_works_of_adhesion_of_a_smooth_sphere_are_one(campaign):
