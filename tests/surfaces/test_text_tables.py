@@ -1,6 +1,7 @@
 """Heights in texts of people and instruments; or a message with the line and what to do."""
 
 import gzip
+import re
 
 import numpy as np
 import pytest
@@ -267,6 +268,28 @@ def test_factors_of_heights_in_headings_are_asked_about(tmp_path, entry):
         read(path, height_unit=None)
     assert "not applied: " in read(path).reading
     assert_heights(read(written(tmp_path, text(rows(), " ", ["Z scale: 1.0", "Z unit: nm"])), height_unit=None))
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["Line spacing: 1 um", "Pixel aspect ratio: 2", "Binning: 2", "Z increment: 0.1 nm", "Values x 10", "BAD = 0"],
+)
+def test_lines_that_may_change_size_and_heights_are_asked_about(tmp_path, line):
+    path = written(tmp_path, text(rows(), " ", ["Pixel: 0.5 um", "Z unit: nm", line]), "scan.txt")
+    with refused("size", f"also {re.escape(repr(line))}, which may change it"):
+        read(path, size=None)
+    with refused("height_unit", f"also {re.escape(repr(line))}, which may change it|may be a factor"):
+        read(path, height_unit=None)
+    assert_heights(read(path))
+    harmless = ["Pixel: 0.5 um", "Z unit: nm", "Date: 2026-01-01", "Scan rate: 1 Hz", "Setpoint: 0.5 V"]
+    assert_heights(read(written(tmp_path, text(rows(), " ", harmless)), height_unit=None))
+
+
+def test_a_size_with_a_point_beside_decimal_commas_is_ambiguous(tmp_path):
+    fields = rows(write=lambda height: f"{height:.2f}".replace(".", ","))
+    path = written(tmp_path, text(fields, ";", ["Scan size: 2.000 µm", "Z unit: nm"]), "scan.txt")
+    with refused("size", "2.000 µm.*thousands"):
+        read(path, size=None)
 
 
 def test_a_size_with_three_digits_behind_a_comma_is_ambiguous(tmp_path):

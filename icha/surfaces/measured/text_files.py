@@ -63,9 +63,17 @@ _NAMES = {
     "pixel": "pixel|pixel size|pixel spacing|point spacing|spacing|cell size|cellsize|xy calibration|xy justierung",
     "rows": "nrows|rows|lines|number of rows|number of lines|vertical|vertikal",
     "columns": "ncols|cols|columns|number of columns|horizontal|horizont",
-    "missing": "nodata value|nodata|no data value|missing value|missing data value|bad value|bad data|invalid"
+    "missing": "nodata value|nodata|no data|undefined value|nan value|fehlwert|ungültiger wert|valeur manquante"
+    "|no data value|missing value|missing data value|bad value|bad data|invalid"
     "|invalid value|invalid data|invalid height|void value|null value|fill value|fillvalue",
 }
+# Names of lines about the measurement that contain numbers and change neither size nor heights.
+_REMARKS = re.compile(
+    r"date|time|datum|zeit|heure|version|serial|operator|user|file|name|comment|title|\b(?:id|no|nr|number)\b|temperature"
+    r"|channel|\b[ip] gain|rate|speed|samples|average|zoom"
+)
+# A number alone, or a number and a unit of length.
+_VALUE = re.compile(rf"{_NUMBER}\s*(\S*)")
 _MEANINGS = {name: meaning for meaning, names in _NAMES.items() for name in names.split("|")}
 # Number for a missing height in grids by ESRI, if the heading does not define another number.
 _ESRI_MISSING = -9999.0
@@ -250,13 +258,33 @@ class _Heading:
             previous = meaning, value
             names.add(name)
         self.is_grid = {"ncols", "nrows"} <= names
+        self.is_known = self.is_grid or not names.isdisjoint({"xy calibration", "xy justierung"})
         # The heading of an image that Gwyddion exported.
         image = ["width", "height", "value units"]
         self.is_image = image == [each for each, _, line in self.entries if line.startswith("#") and each in image]
+        self.is_known |= self.is_image
 
     def values(self, *meanings: str) -> list[str]:
         """Return the values of the entries with these meanings."""
         return [value for meaning, value, _ in self.entries if meaning in meanings]
+
+    def ask_about_unread_line(self, key: str, stated: str) -> None:
+        """Raise UnfitTopography if a heading of no known format has a line that may change what it states for a key.
+
+        Such lines state a number alone or a length under a name that ICHA does not know, such as a line spacing,
+        binning or factor of the heights.
+        """
+        for name, value, line in () if self.is_known else self.entries:
+            found = _VALUE.match(value)
+            known = name in _NAMES or name == "distance of points" or _REMARKS.search(name)
+            if not found or known or re.fullmatch(r"1(?:[.,]0*)?", value):
+                continue
+            if not found[2] or metres_of(found[2]) or found[2] in ("x", "X", "×", "*"):
+                raise UnfitTopography(
+                    key,
+                    f"is missing; the heading states {stated!r}, but also {line.strip()[:60]!r}, which may change it. "
+                    "Give the value for the table of numbers in this key",
+                )
 
     def agrees_with(self, shape: tuple[int, int]) -> bool:
         """Return whether the heading states the rows and columns of a table; raise an error if it states others."""
@@ -276,6 +304,8 @@ class _Heading:
     def find_height_unit(self, settings: Preparation) -> float | None:
         """Return the unit of the heights, m; None without a unit."""
         texts = self.values("value units", "unit of heights") or self.values("unit")
+        if texts and settings.height_unit is None:
+            self.ask_about_unread_line("height_unit", texts[0])
         return _agreed("height_unit", texts, settings.height_unit)
 
     def find_lateral_unit(self, settings: Preparation) -> float | None:
@@ -300,9 +330,12 @@ class _Heading:
             steps = re.fullmatch(rf"{_NUMBER}(?: x {_NUMBER})?", texts[0][0]) if self.is_grid and texts else None
             return None, steps and (_number(steps[1]) * columns, _number(steps[2] or steps[1]) * rows)
         stated = ", ".join(text for text, _, _ in found)
+        if settings.size is None:
+            self.ask_about_unread_line("size", stated)
         pixels = [(x / columns, y / rows) for _, x, y in found]
-        if self.decimal != "," and any(AMBIGUOUS_COMMA.match(text) for text, _, _ in found):
-            problem = f"is {stated!r} in the file; the comma may be decimal or separate thousands"
+        mark = "." if self.decimal == "," else ","
+        if any(AMBIGUOUS_COMMA.match(text.replace(".", ",")) and mark in text for text, _, _ in found):
+            problem = f"is {stated!r} in the file; the {mark!r} may be decimal or separate thousands"
         elif self.is_grid or self.is_image or np.allclose(pixels, pixels[0][0], rtol=_SQUARE, atol=0):
             return found[0][1:], None
         else:
