@@ -270,7 +270,7 @@ class Campaign(Section):
             yield from _within(("studies", label), self._model_problems(study))
             if is_derived_study(label, self.studies):
                 continue  # its problems are those of the study from which it is derived
-            yield from _within(("studies", label), study.problems(self.snapshots_of(label), *self._units(label)))
+            yield from _within(("studies", label), study.problems(self.snapshots_of(label), *self.units_of(label)))
             yield from _within(("studies", label), self._tension_problems(study))
             yield from _within(("studies", label), self._edge_problems(study))
         sections = {section: getattr(self, section) for section in (*BESIDE_STUDIES, "measurements")}
@@ -291,7 +291,7 @@ class Campaign(Section):
             except ValueError as error:
                 yield ("measurements", label, "path"), entry.path, str(error)
 
-    def _units(self, study: str) -> tuple[float, float, float]:
+    def units_of(self, study: str) -> tuple[float, float, float]:
         """Return the smallest E* h'rms (Pa), E* A0 h'rms (N) and side (m) of a study; infinite if they are unknown."""
         known = [each for each in self.contacts(study) if hasattr(self._grid_and_period(each.surface), "period")]
         sides = {each.surface: self.period(each.surface) for each in known}

@@ -12,12 +12,14 @@ from icha.figures.declaration import FigureOptions
 from icha.figures.own_figure import OwnFigure, caption_in, modules_of
 from icha.figures.registry import DECLARATIONS, figure_number
 from icha.support.formatting import format_quantity
-from icha.support.titles import contradicting_unit
+from icha.support.titles import contradicting_unit, problem_with_numbers
 from icha.support.values import NOTHING, File, Name, Positive, Problem, Section, Text, conversion_factor, unknown
 
 # Reduced pressure at which contact without adhesion is complete, for a side of 10^6 shortest wavelengths. Surfaces with
 # fewer wavelengths are in full contact at smaller pressures.
 _FULL_CONTACT = gaussian_complete_pressure(1e6)
+# Smallest plausible unit of nominal pressures, Pa. `mPa` is a thousandth of a pascal; most often, MPa is meant.
+_SMALLEST_UNIT = 0.01
 
 
 def _factor(unit: str, si_unit: str) -> float | None:
@@ -76,6 +78,8 @@ class Measurement(Section):
         load, area = self.load.unit, self.area.unit
         if self.load_is_pressure and _factor(load, "Pa") is None:
             raise ValueError(f"load: the unit is {load!r}; expected '1' or a unit of pressure, such as 'kPa'")
+        if self.load_is_pressure and _factor(load, "Pa") < _SMALLEST_UNIT:
+            raise ValueError(f"load: the unit {load!r} is implausibly small; expected 'MPa', 'kPa' or 'Pa'")
         if _factor(area, "1") is None:
             raise ValueError(f"area: the unit is {area!r}; expected '1' or 'percent'")
         if self.load_is_pressure and self.material is None:
@@ -86,6 +90,11 @@ class Measurement(Section):
                 raise ValueError(
                     f"{key}: the unit is {column.unit!r}, but the heading {column.column!r} states {stated!r}; "
                     "expected the same unit. Correct `unit`, or the heading in the table and in `column`"
+                )
+            if problem := problem_with_numbers(column.column, column.unit, si_unit):
+                raise ValueError(
+                    f"{key}: the heading {column.column!r} {problem}. Correct `unit` or the table, and if the numbers "
+                    f"are in the unit {column.unit!r}, rename the heading in the table and in `column`"
                 )
         return self
 

@@ -15,7 +15,7 @@ from icha.configuration.campaign import Campaign, Contact
 from icha.configuration.surfaces import SelfAffineSurface
 from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets.labels import coarse_study, is_derived_study
-from icha.path.targets import QUANTITIES, UNITS
+from icha.path.targets import FORCE, NOMINAL_PRESSURE, QUANTITIES, UNITS
 from icha.support import formatting
 from icha.support.usual import RMS_SLOPE, SIDE, USUAL, Usual
 from icha.support.values import Problem, to_number, to_si
@@ -23,6 +23,9 @@ from icha.surfaces.moments import self_affine_full_contact_energy, self_affine_m
 from icha.surfaces.resolution import LEAST_CELLS, RECOMMENDED_CELLS, Resolution
 
 CONFIRMED = "confirmed"
+# Smallest usual reduced pressure of a target with a unit. Such a load presses about 1e-9 of the area into contact, the
+# smallest area fraction of a target. A wrong prefix, mPa for MPa, gives smaller values.
+_LEAST_REDUCED_PRESSURE = 1e-9
 # Sections whose keys are checked.
 _SECTIONS = ("defaults", "surfaces", "materials", "studies")
 
@@ -110,6 +113,24 @@ def unusual_heights(campaign: Campaign) -> Iterator[Unusual]:
                 heights = ", ".join(map(formatting.length, study.rms_heights))
                 source = f" on {contact.surface}, where the rms slope is {contact.rms_slope:.3g}"
                 yield Unusual(("studies", name, "rms_heights"), heights, RMS_SLOPE, source)
+                break
+
+
+def negligible_loads(campaign: Campaign) -> Iterator[Unusual]:
+    """For each study, yield the first pressure or force whose reduced pressure is less than 1e-9 for every contact."""
+    for name, study in campaign.studies.items():
+        if is_derived_study(name, campaign.studies):
+            continue
+        pressure, force, _ = campaign.units_of(name)
+        units = {NOMINAL_PRESSURE: pressure, FORCE: force}
+        for location, kind, value in study.states():
+            unit = units.get(kind, math.inf)
+            if unit < math.inf and 0 < abs(value) < _LEAST_REDUCED_PRESSURE * unit:
+                least = formatting.format_quantity(_LEAST_REDUCED_PRESSURE * unit, UNITS[kind])
+                expected = f"0, or at least {least} (a reduced pressure of {_LEAST_REDUCED_PRESSURE:g})"
+                shown = formatting.format_quantity(value, UNITS[kind])
+                source = f" (a reduced pressure of {value / unit:.3g})"
+                yield Unusual(("studies", name, *location), shown, expected, source)
                 break
 
 

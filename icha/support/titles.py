@@ -10,12 +10,29 @@ _BRACKETS = re.compile(r"\(((?:[^()]|\([^()]*\))*)\)|\[([^\[\]]*)\]")
 _ANGLE = re.compile(r"rad(?:ians?)?\b|(?:cycles?|lines?)\b")
 _LENGTH_POWER = re.compile(r"([^\W\d_]+)\s*(?:\^|\*\*)?\s*([-+]?\d+)?")
 # Signs before a unit that has no brackets, as in `pressure / MPa` and `pressure_MPa`.
-_BEFORE_UNIT = re.compile(r"^|\s*/\s*|[\s_,:;]+|(?=%)")
+_BEFORE_UNIT = re.compile(r"^|\s*/\s*|[\s_,:;]+|(?=[%‰])")
 # A factor before a unit, as in `10^3 Pa`.
 _MULTIPLE = re.compile(r"(?:10\^|10\*\*|1e|^|[x×*]\s*)[-+]?\d+\s*[x×*]?\s*$")
 # Spellings in titles that are not units of configurations, in small letters.
 _SPELLINGS = {"pa": "Pa", "kpa": "kPa", "mpa": "MPa", "gpa": "GPa", "pct": "percent", "per cent": "percent"}
 _SPELLINGS |= {"-": "1", "fraction": "1", "ratio": "1"}
+_SPELLINGS |= {"‰": "permille", "promille": "permille", "per mille": "permille"}
+# Signs of logarithms, such as `log10 p`, `ln(p)` and `lgA`.
+_LOGARITHM = re.compile(r"(?<![a-z])(?:log(?:arithm\w*)?|ln|lg)(?:_?\d+|_?e)?[ap]?(?![a-z])", re.IGNORECASE)
+# Factors of all numbers, as in `pressure x 1e3`, `pressure * 1000`, `1000 x pressure`, `10^3 p` and `p/1000`.
+_FACTORS = (
+    r"(?:(?<![^\W_])[xX]|×|·|⋅|(?<!\*)\*(?!\*))\s*[-+]?\d",
+    r"(?<![\w^+-])\d+(?:\s*[×·⋅]|\s*\*(?!\*)|\s+[xX]\s)",
+    r"(?<!\w)10\s*(?:\^|\*\*|(?=[⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻]))",
+    r"(?<![\w.])\d[\d.]*[eE][-+]?\d",
+    r"(?<=[^\d\s/])\s*/\s*10+(?!\w)",
+)
+_FACTOR = re.compile("|".join(_FACTORS))
+# Names of fractions, such as A/A0 and A_real/A_nom.
+_FRACTION = re.compile(r"\b[Aa]\w*\s*/\s*[Aa]|fraction|(?<![a-z])ratio", re.IGNORECASE)
+# Loads divided by a modulus, such as F/(E* A0) and p/E*, and the slopes by which reduced pressures are also divided.
+_OVER_MODULUS = re.compile(r"/\s*\(?\s*(?:A\w*[\s*·]+)?E(?=[^A-Za-z]|$|A|r\b|eff\b|star\b)|(?i:relative[\s_]+load)")
+_SLOPE = re.compile(r"h|slope|rms|grad|∇|\bg|m_?2", re.IGNORECASE)
 
 
 def bracketed_texts(title: str) -> list[str]:
@@ -47,6 +64,31 @@ def contradicting_unit(title: str, unit: str, si_unit: str) -> str | None:
             continue
         agrees = found[0] == si_unit and math.isclose(found[1], conversion_factor(unit, si_unit))
         return None if agrees and not _MULTIPLE.search(before) else text
+    return None
+
+
+def problem_with_numbers(title: str, unit: str, si_unit: str) -> str | None:
+    """Return why the numbers below a title are probably not values in `unit`, and what to do; None if they may be.
+
+    Parameters
+    ----------
+    title : title of the column, without a unit that contradicts `unit`.
+    unit : unit of the numbers according to the configuration.
+    si_unit : Pa for pressures, 1 for ratios.
+    """
+    if found := _LOGARITHM.search(unicodedata.normalize("NFKC", title)):
+        return f"contains {found[0]!r}, so the numbers look like logarithms; expected the values themselves"
+    if _FACTOR.search(title):
+        return "contains a factor; expected numbers without a factor"
+    title = unicodedata.normalize("NFKC", title)
+    if si_unit != "1":
+        return None
+    if (found := _OVER_MODULUS.search(title)) and not _SLOPE.search(title, found.start()):
+        return "is a load over E* without the rms slope; expected reduced pressures p/(E* h'rms), or pressures"
+    factor = float(conversion_factor(unit, "1"))
+    stated = any(_meaning(text) == ("1", factor) for text, *_ in _possible_units(title))
+    if factor != 1 and _FRACTION.search(title) and not stated:
+        return f"is the name of a fraction; expected the unit '1', or a heading with the unit, such as 'area ({unit})'"
     return None
 
 
