@@ -28,8 +28,8 @@ _FACTORS = (
     r"(?<=[^\d\s/])\s*/\s*10+(?!\w)",
 )
 _FACTOR = re.compile("|".join(_FACTORS))
-# Names of fractions, such as A/A0 and A_real/A_nom.
-_FRACTION = re.compile(r"\b[Aa]\w*\s*/\s*[Aa]|fraction|(?<![a-z])ratio", re.IGNORECASE)
+# Names of quotients, such as A/A0 and A_real/A_nom. Words such as "area fraction" also stand above numbers in percent.
+_FRACTION = re.compile(r"\b[Aa]\w*\s*/\s*[Aa]")
 # Loads divided by a modulus, such as F/(E* A0) and p/E*, and the slopes by which reduced pressures are also divided.
 _OVER_MODULUS = re.compile(r"/\s*\(?\s*(?:A\w*[\s*·]+)?E(?=[^A-Za-z]|$|A|r\b|eff\b|star\b)|(?i:relative[\s_]+load)")
 _SLOPE = re.compile(r"h|slope|rms|grad|∇|\bg|m_?2", re.IGNORECASE)

@@ -119,7 +119,7 @@ def test_measurements_that_cannot_be_drawn(table, changes, message, load, tmp_pa
         ("pressure", "kPa", "area‰", "percent", "states '‰'"),
         ("pressure", "kPa", "A/A0", "percent", "area: the heading 'A/A0' is the name of a fraction; expected the unit"),
         ("pressure", "kPa", "A_real / A_nom", "percent", "is the name of a fraction"),
-        ("pressure", "kPa", "area fraction", "percent", "is the name of a fraction"),
+        ("pressure", "kPa", "area fraction", "percent", None),
         ("log10 pressure (Pa)", "Pa", "area", "percent", "load: the heading 'log10 pressure (Pa)' contains 'log10'"),
         ("ln p", "Pa", "area", "percent", "the numbers look like logarithms; expected the values themselves"),
         ("lg p", "Pa", "area", "percent", "logarithms"),
