@@ -272,7 +272,16 @@ def test_factors_of_heights_in_headings_are_asked_about(tmp_path, entry):
 
 @pytest.mark.parametrize(
     "line",
-    ["Line spacing: 1 um", "Pixel aspect ratio: 2", "Binning: 2", "Z increment: 0.1 nm", "Values x 10", "BAD = 0"],
+    [
+        "Line spacing: 1 um",
+        "Profile spacing: 1 um",
+        "Pixel aspect ratio: 2",
+        "Binning: 2",
+        "Z increment: 0.1 nm",
+        "Conversion: 0.1",
+        "Values x 10",
+        "BAD = 0",
+    ],
 )
 def test_lines_that_may_change_size_and_heights_are_asked_about(tmp_path, line):
     path = written(tmp_path, text(rows(), " ", ["Pixel: 0.5 um", "Z unit: nm", line]), "scan.txt")
@@ -281,8 +290,12 @@ def test_lines_that_may_change_size_and_heights_are_asked_about(tmp_path, line):
     with refused("height_unit", f"also {re.escape(repr(line))}, which may change it|may be a factor"):
         read(path, height_unit=None)
     assert_heights(read(path))
-    harmless = ["Pixel: 0.5 um", "Z unit: nm", "Date: 2026-01-01", "Scan rate: 1 Hz", "Setpoint: 0.5 V"]
-    assert_heights(read(written(tmp_path, text(rows(), " ", harmless)), height_unit=None))
+
+
+@pytest.mark.parametrize("pixels", [["Pixel: 0.5 um"], ["dx: 0.5 um", "dy: 0.5 um"]])
+def test_lines_about_the_measurement_are_not_asked_about(tmp_path, pixels):
+    heading = [*pixels, "Z unit: nm", "Date: 2026-01-01", "Sample name: 3", "Scan rate: 1 Hz", "Setpoint: 0.5 V"]
+    assert_heights(read(written(tmp_path, text(rows(), " ", heading)), height_unit=None, size=None))
 
 
 def test_a_size_with_a_point_beside_decimal_commas_is_ambiguous(tmp_path):

@@ -69,8 +69,8 @@ _NAMES = {
 }
 # Names of lines about the measurement that contain numbers and change neither size nor heights.
 _REMARKS = re.compile(
-    r"date|time|datum|zeit|heure|version|serial|operator|user|file|name|comment|title|\b(?:id|no|nr|number)\b|temperature"
-    r"|channel|\b[ip] gain|rate|speed|samples|average|zoom"
+    r"\b(?:date|time|datum|uhrzeit|heure|version|serial|operator|user|file|name|comment|title|id|no|nr|number"
+    r"|temperature|channel|[ip] gain|rate|speed|samples|average|zoom)\b"
 )
 # A number alone, or a number and a unit of length.
 _VALUE = re.compile(rf"{_NUMBER}\s*(\S*)")
@@ -258,11 +258,11 @@ class _Heading:
             previous = meaning, value
             names.add(name)
         self.is_grid = {"ncols", "nrows"} <= names
-        self.is_known = self.is_grid or not names.isdisjoint({"xy calibration", "xy justierung"})
         # The heading of an image that Gwyddion exported.
         image = ["width", "height", "value units"]
         self.is_image = image == [each for each, _, line in self.entries if line.startswith("#") and each in image]
-        self.is_known |= self.is_image
+        is_keyence = not names.isdisjoint({"xy calibration", "xy justierung"})
+        self.is_known = self.is_grid or self.is_image or is_keyence
 
     def values(self, *meanings: str) -> list[str]:
         """Return the values of the entries with these meanings."""
@@ -276,7 +276,7 @@ class _Heading:
         """
         for name, value, line in () if self.is_known else self.entries:
             found = _VALUE.match(value)
-            known = name in _NAMES or name == "distance of points" or _REMARKS.search(name)
+            known = name in (*_NAMES, "dx", "dy", "distance of points") or _REMARKS.search(name)
             if not found or known or re.fullmatch(r"1(?:[.,]0*)?", value):
                 continue
             if not found[2] or metres_of(found[2]) or found[2] in ("x", "X", "×", "*"):
