@@ -95,9 +95,7 @@ def _print_run(run, file: Path) -> None:
     for label, values in curves.items():
         echo(f"{label:>10} {values.min():.3g} to {values.max():.3g}")
     if "shape" in run:
-        echo(
-            "          units of the shape: p* is p/(E* unit_slope), and h_rms is unit_height, instead of the roughness"
-        )
+        echo("          p* is p/(E* unit_slope), h_rms is unit_height: units of the shape, not of its roughness")
     if "gap/h_rms" in curves:
         echo("          u: distance from mean plane to undeformed half-space; gap: mean gap between the surfaces")
     if "hysteresis_loss" in run:

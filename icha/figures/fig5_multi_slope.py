@@ -147,8 +147,11 @@ def _select(curves, materials, surface):
 def _draw_measured(ax, points, load, area, known, look):
     """Draw a measured curve, if its loads are known in the unit of the axis, and return the values that are drawn."""
     slope, modulus = known["rms_slope"], known["contact_modulus"]
-    unit = 1.0 if modulus is None else modulus * slope if slope else None
-    if points is not ratio_points:
+    if points is ratio_points and modulus is None:  # reduced pressures already
+        unit = 1.0
+    elif points is ratio_points:
+        unit = modulus * slope if slope else None
+    else:
         unit = modulus or (1 / slope if slope else None)
     if unit is None:
         return np.empty(0)
