@@ -81,9 +81,11 @@ def _spectrum_lines(section):
     table = read_spectrum_table(section.path, section.length_unit, section.convention)
     yield from table.sources
     cell, convention = table.in_cell(section.period), section.convention or "surface"
-    whole, part = (formatting.length(float(f"{each.rms_height:.3g}")) for each in (table, cell))
+    given = table.profile_height or table.rms_height
+    given, whole, part = (formatting.length(float(f"{x:.3g}")) for x in (given, table.rms_height, cell.rms_height))
+    surface = f"rms height {whole} of the isotropic surface with these profiles; " if table.profile_height else ""
     yield (
-        f"rms height {whole} of the table, from {CONVENTIONS[convention].meaning} (convention {convention}); "
+        f"rms height {given} of the table, from {CONVENTIONS[convention].meaning} (convention {convention}); {surface}"
         f"rms height {part} and rms slope {cell.rms_slope:.3g} in the cell"
     )
 

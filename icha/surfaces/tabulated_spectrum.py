@@ -12,12 +12,12 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import gamma
+from scipy.optimize import isotonic_regression
 
 from icha.support.atomic_files import whole_file
 from icha.support.rules import LENGTH
 from icha.support.tables import check_lengths, is_number, positive_numbers, read_rows
-from icha.support.titles import bracketed_texts, power_of_length
+from icha.support.titles import bracketed_texts, power_of_length, problem_with_numbers
 from icha.surfaces.moments import radial_power_spectrum
 from icha.surfaces.spectrum import IsotropicSpectrum
 from icha.surfaces.surface import Surface
@@ -25,6 +25,8 @@ from icha.surfaces.surface import Surface
 # Trusted wave numbers begin at this multiple of 2 pi/L, because the removal of the trend weakens longer waves. They end
 # at a wavelength of this number of pixels.
 _LONGEST, _PIXELS = 2.0, 4.0
+# Relative error of wave numbers that a file contains with four digits. The longest wave of the cell must not be lost.
+_ROUNDING = 1e-3
 # Rows of a merged table per decade of the wave number.
 _PER_DECADE = 10
 _HEADING = (
@@ -41,11 +43,13 @@ class SpectrumTable:
     wave_number : (n,) float, wave numbers q, rad/m, increasing.
     power : (n,) float, C(q), m^4, positive.
     sources : one line for each scan or profile: its trusted range, and what limits the range.
+    profile_height : rms height of the waves in the rows of a table of profiles, m, before the conversion; else None.
     """
 
     wave_number: np.ndarray
     power: np.ndarray
     sources: tuple[str, ...] = ()
+    profile_height: float | None = None
 
     def __post_init__(self):
         """Check the table."""
@@ -113,7 +117,7 @@ class TabulatedSpectrum(IsotropicSpectrum):
         known = np.log(self.table.wave_number), np.log(self.table.power)
         with np.errstate(divide="ignore"):
             inside = np.exp(np.interp(np.log(q), *known))
-        ends = self.table.wave_number[[0, -1]] * (1 - 1e-9, 1 + 1e-9)
+        ends = self.table.wave_number[[0, -1]] * (1 - _ROUNDING, 1 + 1e-9)
         return np.where((q >= ends[0]) & (q <= ends[1]), inside, 0.0)
 
     @cached_property
@@ -206,15 +210,25 @@ def read_spectrum_table(
                 "length_unit", f"does not agree with the titles, which state {units.text}. Remove the key"
             )
         per_length, power_unit = stated
+    else:
+        for line in (*remarks, *(" ".join(row) for _, row in words)):
+            named = _NAMED_UNIT.search(line)
+            found = power_of_length(named[1]) if named else None
+            if found and found[1] == 1 and not math.isclose(found[0], unit):
+                raise UnfitTopography(
+                    "length_unit",
+                    f"is {f'{unit:g} m' if length_unit else 'missing'}, but the heading states {line[:60]!r}; expected "
+                    f"{named[1]}, with q in rad/{named[1]}, or titles with units, such as q (rad/um), C (um^4)",
+                )
     q, power = positive_numbers(rows, {0: "1", 1: "2"})
     q, power = q * per_length * chosen.wave_factor, power * power_unit * chosen.power_factor
     if not (np.diff(q) > 0).all():
         raise ValueError("has wave numbers that do not increase from row to row; expected each once, sorted")
+    height = None
     if chosen.dimension == 1:
-        # The conversion needs a smooth spectrum.
-        q, power = _in_rings(q, power)
-        power = isotropic_from_profile(q, power)
-    return SpectrumTable(q, power, tuple(line for line in remarks if line.startswith(("scan", "profiles"))))
+        height = math.sqrt(2 * float(np.trapezoid(power, q)))
+        q, power = _isotropic_from_table(q, power)
+    return SpectrumTable(q, power, tuple(line for line in remarks if line.startswith(("scan", "profiles"))), height)
 
 
 class _Units(NamedTuple):
@@ -236,6 +250,8 @@ class _Units(NamedTuple):
 
 
 _ANGLE = re.compile(r"(rad(?:ians?)?\b)|((?:cycles?|lines?)\b)")
+# A line with a unit of all columns, such as `units: nm`.
+_NAMED_UNIT = re.compile(r"\bunits?\b(?:[^:=]*[:=]|\s+of)\s*([^\s,;]+)", re.IGNORECASE)
 _WAVELENGTH = re.compile(r"\W*(?:wave\s?length|lambda|λ)", re.IGNORECASE)
 
 
@@ -243,6 +259,8 @@ def _units_of(words, remarks) -> _Units | None:
     """Return the units in the titles above the numbers; None if there are none. Raises ValueError for other titles."""
     for row in [*(row for _, row in reversed(words)), *(remark.split() for remark in remarks[-1:])]:
         line = " ".join(row)
+        if problem := problem_with_numbers(re.sub(r"2\s*[*·]?\s*(?:pi|π)", "", line), "Pa", "Pa"):
+            raise ValueError(f"has the titles {line[:60]!r}. This {problem}")
         texts = bracketed_texts(line) or row
         if not 1 <= len(texts) <= 2 or (texts is row and None in map(power_of_length, row)):
             # Units without brackets, such as q in rad/um, C in um^4.
@@ -372,10 +390,9 @@ def _of_profiles(profiles):
         groups.setdefault((float(f"{steps[0]:.6g}"), len(x)), []).append(_spectrum_of_profile(x, z))
     found = []
     for (step, count), spectra in groups.items():
-        # The mean over profiles comes first, because the conversion needs a smooth spectrum.
         q, one = _in_rings(2 * np.pi / (step * count) * np.arange(1, len(spectra[0]) + 1), np.mean(spectra, axis=0))
         trusted = _LONGEST * 2 * np.pi / (step * count), 2 * np.pi / (_PIXELS * step), _ISOTROPIC
-        found.append((q, isotropic_from_profile(q, one), trusted))
+        found.append((q, isotropic_from_profile(q, _falling(one)), trusted))
     return found
 
 
@@ -390,7 +407,8 @@ def _spectrum_of_profile(x, z):
 def _in_rings(q, power):
     """Return means of wave numbers and powers in intervals with equal steps of the logarithm.
 
-    The mean is that of power/q^s, where q^s is the best power law, so a power law remains unchanged.
+    The mean is that of power/q^s, where q^s is the best power law, so a power law remains unchanged. The first and the
+    last mean stand at the ends of the table.
     """
     edges = np.geomspace(0.999 * q[0], 1.001 * q[-1], max(3, math.ceil(_PER_DECADE * math.log10(q[-1] / q[0])) + 1))
     ring = np.searchsorted(edges, q) - 1
@@ -399,24 +417,58 @@ def _in_rings(q, power):
     log_q, level = (
         np.bincount(ring, weights=each)[count > 0] / count[count > 0] for each in (np.log(q), power / q**exponent)
     )
+    log_q[[0, -1]] = np.log(q[[0, -1]])
     return np.exp(log_q), level * np.exp(exponent * log_q)
 
 
-_ISOTROPIC = "one-dimensional spectrum, converted for an isotropic surface with a local power law"
+_ISOTROPIC = "one-dimensional spectrum, converted for an isotropic surface"
+
+
+def _falling(one):
+    """Return the nearest spectrum of profiles that nowhere rises; its surface has no negative power."""
+    return isotonic_regression(one, increasing=False).x
+
+
+def _isotropic_from_table(q, one):
+    """Convert all rows of a spectrum of profiles; convert means over intervals of q if noise makes a power negative."""
+    power = isotropic_from_profile(q, one)
+    if not (power > 0).all():
+        q, one = _in_rings(q, one)
+        power = isotropic_from_profile(q, _falling(one))
+    if not (power > 0).all():
+        raise ValueError(
+            f"has a spectrum of profiles that does not fall from q = {q[np.argmin(power > 0)]:.3g} rad/m to its end; "
+            "profiles of an isotropic surface contain all shorter waves, so their spectrum falls. Remove rows of noise"
+        )
+    return q, power
 
 
 def isotropic_from_profile(q: Sequence[float], one: Sequence[float]) -> np.ndarray:
     """Convert the spectrum of profiles of an isotropic surface to the spectrum of the surface.
 
-    For C(q) = c q^-(2+2H), the integral over the other wave number gives
-    C1D(q) = c sqrt(pi) Gamma(H + 1/2)/Gamma(H + 1) q^-(1+2H). The exponent is that of the neighbouring wave numbers.
+    Each row contains all waves of the surface with at least this wave number, C1D(q) = 2 int_0^inf C(sqrt(q^2 + s^2))
+    ds. This is an Abel transform; its inverse is C(q) = -1/pi int_q^inf C1D'(k)/sqrt(k^2 - q^2) dk, in which
+    k = q cosh(u). Between two rows, C1D is a power law. That of the last two rows continues behind the last row, so
+    waves beyond the table are not added to the rows.
 
     Parameters
     ----------
     q : wave numbers, rad/m, increasing.
     one : C1D(q), m^3; its integral over positive and negative wave numbers is the mean square height.
+
+    Returns
+    -------
+    C(q), m^4; not positive if these are not the profiles of an isotropic surface.
     """
-    wave_number, power = np.asarray(q, float), np.asarray(one, float)
-    exponent = -np.gradient(np.log(power), np.log(wave_number))
-    hurst = np.clip((exponent - 1) / 2, -0.4, 2.0)
-    return power / wave_number * gamma(hurst + 1) / (math.sqrt(math.pi) * gamma(hurst + 0.5))
+    log_q, log_one = np.log(q), np.log(one)
+    exponent = -np.diff(log_one) / np.diff(log_q)
+    u = np.linspace(0.0, 12.0, 2001)
+    power = np.empty(len(log_q))
+    with np.errstate(over="ignore", invalid="ignore"):  # for a last power law that rises
+        for row, start in enumerate(log_q):
+            log_k = start + np.log(np.cosh(u))
+            piece = np.clip(np.searchsorted(log_q, log_k, side="right") - 1, 0, len(exponent) - 1)
+            law = exponent[piece]
+            integrand = law * np.exp(log_one[piece] - law * (log_k - log_q[piece]) - log_k)
+            power[row] = np.trapezoid(integrand, u) / np.pi
+    return power

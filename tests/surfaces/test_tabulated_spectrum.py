@@ -58,6 +58,11 @@ def test_a_table_is_written_and_read_in_any_unit_of_length(tmp_path):
         ("q (1/px), C (px^4)\n1, 2\n2, 1\n", "expected units of length in brackets"),
         ("lambda (um), C (um^4)\n1, 2\n2, 1\n", "the first column looks like a wavelength; expected wave numbers"),
         ("wavelength;C\n1;2\n2;1\n", "the first column looks like a wavelength"),
+        ("log10 q, log10 C\n1, 2\n2, 1\n", "the numbers look like logarithms; expected the values themselves"),
+        ("# log(q) (rad/um), log(C) (um^4)\n1, 2\n2, 1\n", "the numbers look like logarithms"),
+        ("q (rad/m) x 1e6, C (m^4)\n1, 2\n2, 1\n", "contains a factor"),
+        ("# units: nm\n1, 2\n2, 1\n", "is missing, but the heading states 'units: nm'"),
+        ("Length unit;um\nunit = um\nq;C\n1;2\n2;1\n", "is missing, but the heading states"),
         ("1.200;12\n1.300;11\n", "may be decimal or separate thousands"),
     ],
 )
@@ -98,6 +103,15 @@ def test_headings_encodings_and_decimal_commas(tmp_path, heading, encoding, deci
     with pytest.raises(ValueError, match="titles, which state") as raised:
         read_spectrum_table(path, 1e-9)
     assert raised.value.key == "length_unit"
+
+
+def test_a_unit_in_a_line_of_its_own_agrees_with_the_configuration(tmp_path):
+    (tmp_path / "table.txt").write_text("# units: nm\n1 2\n2 1\n")
+    np.testing.assert_allclose(read_spectrum_table(tmp_path / "table.txt", 1e-9).wave_number, [1e9, 2e9])
+    with pytest.raises(ValueError, match="is 1e-06 m, but the heading states 'units: nm'"):
+        read_spectrum_table(tmp_path / "table.txt", 1e-6)
+    (tmp_path / "table.txt").write_text("# Height unit: nm\n# q = 2*pi*f (rad/m), C (m^4)\n1 2\n2 1\n")
+    np.testing.assert_allclose(read_spectrum_table(tmp_path / "table.txt").wave_number, [1, 2])
 
 
 @pytest.mark.parametrize(
@@ -144,6 +158,41 @@ def test_conventions_of_spectra(tmp_path, convention):
     inside = (found.wave_number > 1.5 * q[0]) & (found.wave_number < q[-1] / 1.5)
     rtol = 1e-9 if convention.startswith("surface") else 1e-3
     np.testing.assert_allclose(found.power[inside], found.wave_number[inside] ** -3.6, rtol=rtol)
+
+
+@pytest.mark.parametrize(
+    ("rows", "step", "noise"), [(200, np.geomspace, 0), (30, np.geomspace, 0), (999, np.linspace, 1)]
+)
+def test_a_table_of_profiles_keeps_its_ends(tmp_path, rows, step, noise):
+    """The reference is a power law without waves outside [1e5, 2.5e6] rad/m, from its definition."""
+    low, high = 1e5, 2.5e6
+    q = step(low, 0.999 * high, rows)
+    end = np.sqrt(high**2 - q**2)
+    one = np.array([2 * quad(lambda s, x=x: (x**2 + s**2) ** -1.8, 0, y)[0] for x, y in zip(q, end, strict=True)])
+    one *= np.random.default_rng(1).gamma(4, 1 / 4, rows) if noise else 1
+    np.savetxt(tmp_path / "table.txt", np.column_stack([q, one]), fmt="%.5e")
+    found = read_spectrum_table(tmp_path / "table.txt", convention="profile")
+    np.testing.assert_allclose(found.wave_number[[0, -1]], q[[0, -1]], rtol=1e-5)
+    assert found.profile_height == pytest.approx(np.sqrt(2 * np.trapezoid(one, q)), rel=1e-5)
+    height, slope = (np.sqrt(2 * np.pi * quad(lambda q, n=n: q ** (n - 3.6), low, high)[0]) for n in (1, 3))
+    fine = np.geomspace(low, 0.999 * high, 10_000)
+    power = np.exp(np.interp(np.log(fine), np.log(found.wave_number), np.log(found.power)))
+    assert found.rms_height == pytest.approx(height, rel=0.05 if noise else 0.002)
+    assert np.sqrt(2 * np.pi * np.trapezoid(fine**3 * power, fine)) == pytest.approx(
+        slope, rel=0.04 if noise else 0.015
+    )
+
+
+def test_profiles_that_end_in_noise_are_refused(tmp_path):
+    one = [*np.geomspace(1, 1e-3, 30), *1e-3 * np.random.default_rng(1).gamma(9, 1 / 9, 60)]
+    np.savetxt(tmp_path / "table.txt", np.column_stack([np.geomspace(1, 1e3, 90), one]))
+    with pytest.raises(ValueError, match=r"does not fall from q = .* rad/m to its end"):
+        read_spectrum_table(tmp_path / "table.txt", convention="profile")
+
+
+def test_rounded_wave_numbers_keep_the_longest_wave_of_the_cell():
+    rounded = SpectrumTable(Q * (1 + 5e-7), TABLE.power).in_cell(SIDE)
+    assert rounded.rms_height == pytest.approx(TABLE.in_cell(SIDE).rms_height, rel=1e-5)
 
 
 def test_the_mean_square_height_is_the_integral_of_the_spectrum():
