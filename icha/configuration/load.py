@@ -19,6 +19,7 @@ from icha.configuration.plausibility import (
     coarse_contacts,
     coarse_grids,
     long_ranges,
+    mirrored_forces,
     negligible_loads,
     plausibility_problems,
     sticky_runs,
@@ -104,6 +105,7 @@ def _load(path: Path, origin: str, written: Mapping, within: str | os.PathLike |
         unusual += unusual_topography(location, campaign.surfaces[name], each.period, each.rms_slope)
     unusual += unusual_heights(campaign)
     unusual += negligible_loads(campaign)
+    unusual += mirrored_forces(campaign)
     unusual += coarse_grids(campaign)
     sticky = list(sticky_runs(campaign))
     if too_sticky := [each for each in sticky if _chooses_levels(campaign.studies[each.location[1]])]:

@@ -19,6 +19,7 @@ from icha.path.targets import FORCE, NOMINAL_PRESSURE, QUANTITIES, UNITS
 from icha.support import formatting
 from icha.support.usual import RMS_SLOPE, SIDE, USUAL, Usual
 from icha.support.values import Problem, to_number, to_si
+from icha.surfaces.measured.settings import MIRROR
 from icha.surfaces.moments import self_affine_full_contact_energy, self_affine_moments
 from icha.surfaces.resolution import LEAST_CELLS, RECOMMENDED_CELLS, Resolution
 
@@ -90,7 +91,8 @@ def unusual_topography(location: tuple, section: Any, period: float, rms_slope: 
         source = " (the slope depends on units, size and numbers for missing points)"
         if outliers := _kept_outliers(section):
             source = f" (with {outliers}; try `outliers: remove` first)"
-        yield Unusual((*location, "height_unit"), f"rms slope {rms_slope:.3g}", RMS_SLOPE, source)
+        key = "height_unit" if hasattr(section, "height_unit") else "length_unit"
+        yield Unusual((*location, key), f"rms slope {rms_slope:.3g}", RMS_SLOPE, source)
 
 
 def plausibility_problems(
@@ -132,6 +134,20 @@ def negligible_loads(campaign: Campaign) -> Iterator[Unusual]:
                 source = f" (a reduced pressure of {value / unit:.3g})"
                 yield Unusual(("studies", name, *location), shown, expected, source)
                 break
+
+
+def mirrored_forces(campaign: Campaign) -> Iterator[Unusual]:
+    """For each study, yield the first force on a mirrored scan; it acts on the four copies of the scan in the cell."""
+    for name, study in campaign.studies.items():
+        used = dict.fromkeys(contact.surface for contact in campaign.contacts(name))
+        mirrored = (each for each in used if campaign.surfaces[each].boundary == MIRROR)
+        force = next(((location, value) for location, kind, value in study.states() if kind == FORCE), None)
+        if (surface := next(mirrored, None)) is None or force is None or is_derived_study(name, campaign.studies):
+            continue
+        pressure = 4 * force[1] / campaign.period(surface) ** 2
+        source = f" on {surface}, because a mirrored cell contains four copies of the scan, which share the force"
+        expected = f"a pressure, such as {formatting.format_quantity(pressure, 'Pa')} for this force on one scan"
+        yield Unusual(("studies", name, *force[0]), formatting.format_quantity(force[1], "N"), expected, source)
 
 
 def coarse_grids(campaign: Campaign) -> Iterator[Unusual]:

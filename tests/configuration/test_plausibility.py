@@ -100,3 +100,17 @@ def test_on_sticky_surfaces_boundary_elements_alone_reach_an_accuracy(load, refu
     assert "U_full/dgamma" in note and "boundary elements alone give the estimate" in note
     levels = {"asperities": "1..8", "coarse": "1..6", "fine": "1..4"}
     refused("", sticky | {"studies.one.levels": levels}, "or `levels` without `asperities`")
+
+
+def test_a_force_on_a_mirrored_scan_is_refused(load, refused):
+    """The cell contains four copies of the scan of 64 um x 64 um, so the pressure would be a quarter."""
+    changes = {
+        "surfaces.rough": measured_surface(boundary="mirror"),
+        "studies.one.targets": {"forces": ["1 mN"]},
+        "studies.one.rms_slopes": "measured",
+        "studies.one.seeds": None,
+    }
+    refused("", changes, "studies.one.targets.forces[0]: '1 mN' is unusual on rough")
+    refused("", changes, "expected a pressure, such as 244.1 kPa for this force on one scan")
+    (warning,) = load(changes | {"confirmed": ["studies.one.targets.forces"]}).warnings
+    assert "four copies of the scan" in warning

@@ -243,7 +243,7 @@ def test_commas_before_three_digits_are_ambiguous(tmp_path, delimiter):
     assert_heights(read(written(tmp_path, text(decimal("{:.3f}", HEIGHTS + 1e4), delimiter))))
 
 
-@pytest.mark.parametrize(("delimiter", "offset"), [(";", 5000), ("\t", 1000)])
+@pytest.mark.parametrize(("delimiter", "offset"), [(";", 5000), ("\t", 1000), ("\t", 5000), (" ", 5000)])
 def test_points_before_three_digits_may_separate_thousands(tmp_path, delimiter, offset):
     integers = rows(HEIGHTS + offset, lambda height: f"{height:,.0f}".replace(",", "."))
     with refused("path", "that may separate thousands.*add a digit"):
@@ -251,14 +251,19 @@ def test_points_before_three_digits_may_separate_thousands(tmp_path, delimiter, 
 
 
 def test_decimal_points_before_three_digits_are_not_asked_about(tmp_path):
-    for heights, delimiter in ((HEIGHTS, ";"), (HEIGHTS + 500, "\t"), (HEIGHTS / 1000 + 500, ",")):
+    for heights, delimiter in ((HEIGHTS, ";"), (HEIGHTS, "\t"), (HEIGHTS / 1000 + 500, ",")):
         assert read(written(tmp_path, text(rows(heights), delimiter))).surface.grid == GRID
     fields = rows(HEIGHTS + 500)
     fields[3][4] += "0"
     assert_heights(read(written(tmp_path, text(fields, ";"))))
-    # Numbers of nodes along x and y are integers in columns of their own.
-    lines = [[f"{k % GRID}", f"{k // GRID}", f"{height:.3f}"] for k, height in enumerate(HEIGHTS.ravel() + 500)]
-    assert_heights(read(written(tmp_path, text(lines, "\t"), "scan.xyz"), size=None, lateral_unit=0.5 * UM))
+
+
+@pytest.mark.parametrize(("delimiter", "blank"), [("\t", " "), (";", " "), ("\t", "\xa0"), (" ", "\u202f")])
+def test_blanks_that_may_separate_thousands_are_refused(tmp_path, delimiter, blank):
+    fields = rows(HEIGHTS + 5000, lambda height: f"{height:,.0f}".replace(",", blank))
+    with refused("path", "blanks may separate thousands or columns|has .* in line 1, column 1; expected a number"):
+        read(written(tmp_path, text(fields, delimiter)))
+    assert_heights(read(written(tmp_path, text(rows(), f" {delimiter} "))))
 
 
 @pytest.mark.parametrize("entry", ["Z scale: 0.5 nm/LSB", "Z-scale factor = 2.5", "Height gain [V]: 3", "Scaling\t0,1"])

@@ -26,9 +26,9 @@ _REMARK = re.compile(r"(?<!1\.)#(?!N/A|NA\b|VALUE!|NUM!|DIV/0!|NULL!|REF!)", re.
 # The exponent of a number in double precision, as Fortran writes it, such as 1.5D-3.
 _FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[-+]?\d)")
 _PLAIN = frozenset("0123456789+-.eE,; \t")
-# A number with a point that may separate thousands; an integer below a thousand, and one without separator.
+# A number with a point that may separate thousands, and an integer of thousands without separator.
 _AMBIGUOUS_POINT = re.compile(r"[-+]?[1-9]\d{0,2}\.\d{3}")
-_BELOW_THOUSAND, _PLAIN_THOUSANDS = re.compile(r"[-+]?\d{1,3}"), re.compile(r"[-+]?\d{4,}")
+_PLAIN_THOUSANDS = re.compile(r"[-+]?\d{4,}")
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+([eE][-+]?\d+)?")
 # A number, with any separator of thousands.
 _LIKE_A_NUMBER = re.compile(r"[-+]?\d[\d.,' ]*")
@@ -265,13 +265,22 @@ def _known_heading(lines):
 
 
 def _find_delimiter(text):
-    """Return the delimiter of a line of numbers; None for other lines, and for lines without a number."""
+    """Return the delimiter of a line of numbers; None for other lines, and for lines without a number.
+
+    Raises UnfitTopography if fields between tabs contain blanks, or if several kinds of blanks occur.
+    """
     text = text.strip()
     for delimiter in "\t;, " if text else "":
         if delimiter not in text and (delimiter != " " or "," in text):
             continue
         numbers, wrong = _to_numbers(split_fields(text, delimiter))
         if not wrong and not np.isnan(numbers).all():
+            if delimiter == " " and re.search(r"[^\S ]", text):
+                raise UnfitTopography(
+                    "path",
+                    f"has different blanks in a row, {text[:40]!r}, so blanks may separate thousands or "
+                    "columns; expected numbers without blanks, and one delimiter between them",
+                )
             return delimiter
     return None
 
@@ -296,22 +305,14 @@ def _is_row(text, delimiter, width):
 def _find_decimal_sign(first, rows, delimiter):
     """Find the decimal sign from the `first` line of numbers, and the fields of all rows.
 
-    Raises UnfitTopography if commas may be decimal signs, delimiters, or separators of thousands, or if points seem to
+    Raises UnfitTopography if commas may be decimal signs, delimiters, or separators of thousands, or if points may
     separate thousands. A leading zero, or another number of digits, shows that points are decimal signs.
     """
     fields = [field for row in rows for field in row]
     with_point = [field for field in fields if "." in field]
-    columns = itertools.zip_longest(*rows, fillvalue="")
-    if (
-        with_point
-        and all(map(_AMBIGUOUS_POINT.fullmatch, with_point))
-        and not any(map(_PLAIN_THOUSANDS.fullmatch, fields))
-        # Semicolons avoid decimal commas. Decimals are not mixed with integers; of both signs, few are all above 1.
-        and (
-            (delimiter == ";" and len({field[0] == "-" for field in with_point}) == 1)
-            or any("." in "".join(c) and any(map(_BELOW_THOUSAND.fullmatch, c)) for c in columns)
-        )
-    ):
+    # A comma between numbers means that the decimal sign is a point.
+    ambiguous = delimiter != "," and with_point and all(map(_AMBIGUOUS_POINT.fullmatch, with_point))
+    if ambiguous and not any(map(_PLAIN_THOUSANDS.fullmatch, fields)):
         raise UnfitTopography(
             "path",
             f"has points, as in {with_point[0]!r}, that may separate thousands: each has three digits after it. Remove "
