@@ -106,6 +106,10 @@ def _results(
             columns = [[getattr(each, name)[:, *index].astype(dtype) for each in row] for row in found]
             column = np.moveaxis(np.array(columns), 1, -1)
             arrays[quantity] = column[..., 0] if of_loop else column
+        # The stiffness of full contact is infinite.
+        infinite = np.isinf(values[quantity])
+        causes[quantity] = np.where(infinite & (causes[quantity] == ""), INFINITE, causes[quantity])
+        values[quantity] = np.where(infinite, np.nan, values[quantity])
     return values, causes
 
 
@@ -120,7 +124,6 @@ def _responses(models, kinds, results, causes, sampled, points, distributions, n
                 continue  # prescribed
             column, why = (each[m] if target < 0 else each[m, ..., target] for each in (values, causes[quantity]))
             # The logarithm of zero contact area, for example, is not finite.
-            why = np.where((why == "") & np.isinf(column), INFINITE, why)
             why = np.where((why == "") & ~(column > 0), NOT_POSITIVE, why)
             # A case counts if all its seeds have a result.
             left_out = find_left_out("cases", [next(filter(None, seeds), "") for seeds in why.T], sampled)

@@ -183,10 +183,8 @@ def _difference(line, truth, points):
 
     members, runs, truths = [], line.stops, truth.stops
     for seed in [seed for seed in runs if seed in truths]:
-        (load, values), (true_load, true_values) = points(runs[seed]), points(truths[seed])
-        pressed = true_load > 0
-        if pressed.any():
-            true_load, true_values = true_load[pressed], true_values[pressed]
+        (load, values), (true_load, true_values) = _pressed(points, runs[seed]), _pressed(points, truths[seed])
+        if load.size and true_load.size:
             at = np.clip(load, true_load.min(), true_load.max())
             at = at[np.isclose(at, load, rtol=_SAME_LOAD, atol=0)]
             largest = min(load.max(), true_load.max())
@@ -198,6 +196,12 @@ def _difference(line, truth, points):
             )
             members.append((at, 100 * (own / true - 1)))
     return at_common_loads(members, logarithmic=False) if members else (np.empty(0), np.empty((0, 0)))
+
+
+def _pressed(points, run):
+    """Return the points of a run at compressive loads; with adhesion, areas may be reached in tension."""
+    load, values = points(run)
+    return load[load > 0], values[load > 0]
 
 
 def _draw_references(left, right, references, limits):
@@ -244,7 +248,9 @@ def _draw_estimates(axes, shown, compared):
             continue
         colour = shown.looks.material_colour(line.runs.labels.material)
         for ax, (points, _), values in zip(axes, _QUANTITIES, states[1:], strict=True):
-            load, true = points(truth.stops[seed])
+            load, true = _pressed(points, truth.stops[seed])
+            if not load.size:
+                continue
             inside = (states[0] >= load.min()) & (states[0] <= load.max())
             at = states[0][inside]
             known = common_loads.interpolate(load, true, at, logarithmic=points is curves.area_points)

@@ -212,13 +212,13 @@ def read_spectrum_table(
         per_length, power_unit = stated
     else:
         for line in (*remarks, *(" ".join(row) for _, row in words)):
-            named = _NAMED_UNIT.search(line)
-            found = power_of_length(named[1]) if named else None
+            name = next(iter(_NAMED_UNIT.findall(line)), "")
+            found = power_of_length(name)
             if found and found[1] == 1 and not math.isclose(found[0], unit):
                 raise UnfitTopography(
                     "length_unit",
                     f"is {f'{unit:g} m' if length_unit else 'missing'}, but the heading states {line[:60]!r}; expected "
-                    f"{named[1]}, with q in rad/{named[1]}, or titles with units, such as q (rad/um), C (um^4)",
+                    f"{name}, with q in rad/{name}, or titles with units, such as q (rad/um), C (um^4)",
                 )
     q, power = positive_numbers(rows, {0: "1", 1: "2"})
     q, power = q * per_length * chosen.wave_factor, power * power_unit * chosen.power_factor

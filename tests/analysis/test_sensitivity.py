@@ -54,6 +54,17 @@ def test_cases_without_a_result_do_not_count():
     assert np.isnan(data["contact_area_fraction"].values[0, 0, 3]).all()
 
 
+def test_full_contact_is_left_out_of_the_stiffness_alone():
+    """The stiffness of full contact is infinite."""
+    runs, samples = sampled()
+    runs[3] = runs[3][0], runs[3][1].assign(contact_stiffness=runs[3][1]["contact_stiffness"] * np.inf)
+    data = sensitivity_of_campaign(campaign_tree(runs), {"one": samples})["one"].to_dataset()
+    of_stiffness = data["response_quantity"].values == "contact_stiffness"
+    assert set(data["case_count"].values[of_stiffness]) == {COUNT - 1} and not np.isinf(data["contact_stiffness"]).any()
+    assert set(data["case_count"].values[~of_stiffness]) == {COUNT}
+    assert "1 in full contact" in data["left_out"].values[of_stiffness][0]
+
+
 def test_words_and_figures_state_the_indices(tree):
     data = tree["one"].to_dataset()
     rows = sample_rows(data)

@@ -318,6 +318,15 @@ def test_fig2_marks_boundary_elements_in_the_colour_of_the_material():
     assert not lines_of(alone.axes[0], "+", "1")
 
 
+def test_fig2_compares_curves_whose_first_area_is_reached_in_tension():
+    runs = [*compared.runs().items(), *compared.patches()]
+    sign = xr.where(np.arange(runs[0][1].sizes["step"]) == 0, -1.0, 1.0)
+    tensile = {name: runs[0][1][name] * sign for name in ("reduced_pressure", "nominal_pressure")}
+    runs[0] = runs[0][0], runs[0][1].assign(tensile)
+    figure = fig2_area_and_gap.figure(campaign_tree(runs), study="one")
+    assert len(figure.axes) == 4 and figure.axes[2].get_lines()
+
+
 def test_fig2_draws_theories_of_separate_summits_where_there_are_any():
     moments = spectral_moments(small.surface())
     adhesive = {(1.0, "soft"): small.MATERIALS["soft"], (1.0, "other"): icha.Material(1e6, 0.02, 2e-9)}
