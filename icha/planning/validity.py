@@ -174,16 +174,18 @@ def _default_ranges(campaign):
 
 def _indenters(campaign):
     """Yield a statement for each shape and material: the contact of the smooth shape by theory, beside the square."""
-    largest, layers = {}, {}
+    largest, layers, unloaded = {}, {}, set()
     for study, surface, name in dict.fromkeys(
         (case.study, case.surface, case.material) for case in run_cases(campaign)
     ):
         if campaign.surfaces[surface].shape and not is_derived_study(study, campaign.studies):
             radii = campaign.contact_radii(campaign.studies[study], surface, name).values()
             largest[surface, name] = max(0.0, *radii, largest.get((surface, name), 0.0))
+            unloaded |= {(surface, name)} if campaign.studies[study].unload else set()
     if not largest:
         return
-    from icha.references.indentation import contact_radius_at, pull_off_force, theory_of  # imports SciPy
+    from icha.references.indentation import contact_radius_at, pull_off_state, theory_of  # imports SciPy
+    from icha.references.limits import describe_coarse_pull_off
 
     for (surface, name), radius in largest.items():
         shape, material = campaign.surfaces[surface].shape.shape, campaign.materials[name]
@@ -199,13 +201,17 @@ def _indenters(campaign):
             jumped = format_quantity(contact_radius_at("indentation", 0.0, *properties), "m")
             at_zero = f"{format_quantity(at_rest, 'm')} ({at_rest * cells:.2g} cells) at zero load"
             found = [f"{jumped} after the jump-in", at_zero, *found]
-        force = pull_off_force(*properties)
-        pull_off = f"a pull-off force of {format_quantity(force, 'N')}, and " if force else ""
+        released = pull_off_state(*properties) if energy else None
+        force = format_quantity(-float(released.force), "N") if released else ""
+        pull_off = f"a pull-off force of {force}, and " if force else ""
         text = (
             f"by the theory of {theory_of(shape, adhesive=energy > 0)}, {name} on {surface} without roughness has "
             f"{pull_off}a contact radius of {', '.join(found)}; half the side is {format_quantity(side / 2, 'm')}"
         )
         enough = not energy or at_rest * cells >= _LEAST_CELLS
+        if released and (surface, name) in unloaded:
+            if coarse := describe_coarse_pull_off(shape, 1 / cells, float(released.contact_radius)):
+                text, enough = f"{text}. With boundary elements, {coarse}", False
         if energy and shape.sphere_radius:
             tabor = math.cbrt((energy / material.contact_modulus) ** 2 * shape.sphere_radius)
             if long_range := describe_short_range(tabor / material.interaction_range):

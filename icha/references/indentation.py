@@ -186,15 +186,16 @@ def contact_radius_at(quantity: str, value: float, shape: Shape, contact_modulus
     return brentq(excess, lower, upper)
 
 
-def pull_off_force(shape: Shape, contact_modulus, work_of_adhesion) -> float:
-    """Return the pull-off force of a smooth shape, N, by the theories of `contact_radius_at`; 0 for a square end."""
+def pull_off_state(shape: Shape, contact_modulus, work_of_adhesion) -> ContactState | None:
+    """Return the pull-off of a smooth shape by the theories of `contact_radius_at`; None for a square end."""
+    material = contact_modulus, work_of_adhesion
     if isinstance(shape, FlatPunch):
-        return 0.0
+        return None
     if isinstance(shape, CylinderPunch):
-        return -float(punch_pull_off(shape.radius, contact_modulus, work_of_adhesion).force)
+        return punch_pull_off(shape.radius, *material)
     if isinstance(shape, Cone):
-        return -float(cone_pull_off(shape.half_angle, contact_modulus, work_of_adhesion).force)
-    return -float(sphere_pull_off(shape.sphere_radius, contact_modulus, work_of_adhesion).force)
+        return cone_pull_off(shape.half_angle, *material)
+    return sphere_pull_off(shape.sphere_radius, *material)
 
 
 def theory_of(shape: Shape, *, adhesive: bool) -> str:

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from icha.asperity.material import Material
+from icha.references.indentation import pull_off_state
 from icha.references.jkr_fits import fit_work_of_adhesion
 from icha.surfaces.surface import Surface
 
@@ -36,8 +37,8 @@ def loop_values(
 ) -> dict[str, float]:
     """Return the values of a loop that ends without contact, by variable name; without adhesion only the force.
 
-    Ratios to the theory of JKR, and fits of this theory, exist only for shapes with a radius on a half-space. A fit
-    exists only if there are enough states.
+    Ratios to a theory exist on a half-space: to JKR for shapes with a radius, to Kendall for a cylinder, and to Maugis
+    & Barquins for a cone. Fits of JKR need a radius and enough states.
 
     Parameters
     ----------
@@ -52,8 +53,11 @@ def loop_values(
     if largest := loop["largest_contact_area_fraction"]:
         values["loss_over_contact"] = loop["hysteresis_loss"] / (energy * largest)
     radius = sphere_radius(surface)
-    if radius is None or material.layered:
+    if material.layered:
         return values
+    if radius is None:
+        known = pull_off_state(surface.shape, material.contact_modulus, energy) if surface.shape else None
+        return values | ({"pull_off_force_over_theory": pull_off / -float(known.force)} if known else {})
     values["pull_off_force_over_jkr"] = pull_off / (1.5 * math.pi * energy * radius)
     for branch, states in (("approach", first_approach(rows)), ("retraction", last_retraction(rows))):
         work = apparent_work_of_adhesion(states, radius, material.contact_modulus)

@@ -122,5 +122,13 @@ def test_contacts_of_indenters_are_compared_with_the_square_and_the_layer(tmp_pa
     assert f"pull-off force of 235.6 µN, and a contact radius of {jumped:.4g} µm after the jump-in, " in ball
     assert f"{at_rest:.4g} µm (10 cells) at zero load, at most 71.43 µm; half the side is 200 µm" in ball
     assert f"theory of Kendall, rubber on punch without roughness has a pull-off force of {1.842:g} mN" in punch
+    assert "computed force" not in punch
+    (tmp_path / "unload.yaml").write_text(INDENTERS.replace("    targets:", "    unload: true\n    targets:"))
+    said = expected_validity(load_configuration(tmp_path / "unload.yaml").campaign)
+    (punch,) = (each for each in said if "Kendall" in each.text)
+    assert (
+        "radius at pull-off has 16 cells: the computed force is about 12 % too small" in punch.text and not punch.good
+    )
+    said = [each for each in expected_validity(load_configuration(tmp_path / "indenters.yaml").campaign)]
     (layer,) = (each for each in said if each.about == "layer")
     assert f"{at_rest / 32:.2g} of the thickness for film on ball (as on a half-space)" in layer.text and not layer.good

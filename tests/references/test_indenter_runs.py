@@ -46,7 +46,11 @@ def test_values_that_are_not_defined_are_left_out():
     assert loop_values(rows, loop, SMOOTH, bare).keys() == {"pull_off_force"}
     assert "work_of_adhesion_retraction" not in loop_values(rows, loop, SMOOTH, sticky)
     cone = icha.Surface(np.zeros((64, 64)), SIDE, "free", Cone(math.radians(80)))
-    assert loop_values(rows, loop, cone, sticky).keys() == {"pull_off_force", "loss_over_contact"}
+    values = loop_values(rows, loop, cone, sticky)
+    assert values.keys() == {"pull_off_force", "loss_over_contact", "pull_off_force_over_theory"}
+    # Maugis & Barquins: 54 w^2 tan^3(half angle)/(pi E*).
+    known = 54 * ENERGY**2 * math.tan(math.radians(80)) ** 3 / (math.pi * MODULUS)
+    assert values["pull_off_force_over_theory"] == pytest.approx(SIDE**2 / known)
     layer = icha.Material(MODULUS, ENERGY, 1e-9, thickness=1e-5)
     assert loop_values(rows, loop, SMOOTH, layer).keys() == {"pull_off_force", "loss_over_contact"}
 

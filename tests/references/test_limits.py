@@ -69,3 +69,11 @@ def test_long_ranges_are_doubted_with_boundary_elements_only():
     assert "Tabor parameter 0.34" in found and "1.74 pi dgamma R" in found and "16 %" in found
     assert doubts(bead, glass, Path(forces=[2e-6]), "asperities") == []
     assert doubts(bead, Material(70e9, 0.0), Path(forces=[2e-6]), "boundary_elements") == []
+
+
+def test_coarse_pull_offs_are_doubted_if_the_path_unloads():
+    """The force on a punch with 8 cells in its radius is 0.765 of Kendall's (docs/indenter.md)."""
+    punch, rubber = surface(CylinderPunch(50e-6), 64, 400e-6), Material(2.7e6, 0.05, 1e-9)
+    (found,) = doubts(punch, rubber, Path(forces=[1e-4], unload=True), "boundary_elements")
+    assert "has 8 cells: the computed force is about 24 % too small" in found
+    assert doubts(punch, rubber, Path(forces=[1e-4]), "boundary_elements") == []
