@@ -15,7 +15,7 @@ import xarray as xr
 
 from icha.analysis.control_variates import PROBABILITY, estimate_quantity
 from icha.analysis.grid_error import cells_of_length, error_beyond, nodes_of
-from icha.analysis.left_out import NOT_POSITIVE, causes_of_runs, find_left_out, varied_parameters
+from icha.analysis.left_out import NOT_POSITIVE, WITHOUT_RUN, causes_of_runs, find_left_out, varied_parameters
 from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
 from icha.datasets.attributes import DERIVED, combine_attributes
 from icha.datasets.build import build_dataset, stack_rows
@@ -83,7 +83,7 @@ def _answers(
         for place in itertools.product(*(range(study.sizes[dim]) for dim in CONTACT)):
             if quantity in OF_SQUARES and not known[place[0]]:
                 continue  # a periodic surface
-            by_seed, left_out = _levels_at(values, place)
+            by_seed, left_out, note = _levels_at(values, place)
             if any(math.isinf(value) for level in by_seed.values() for value in level.values()):
                 continue  # the stiffness of full contact
             mean = estimate_quantity(by_seed["asperities"], by_seed["coarse"], by_seed["fine"])
@@ -109,7 +109,7 @@ def _answers(
                 "coarse_seeds": len(by_seed["coarse"]),
                 "fine_seeds": len(by_seed["fine"]),
                 "full_contact_seeds": sum(area == 1 for area in _levels_at({"fine": areas}, place)[0]["fine"].values()),
-                "left_out": ". ".join(filter(None, (each.sentence for each in left_out))),
+                "left_out": ". ".join(filter(None, (note, *(each.sentence for each in left_out)))),
                 "biased": int(any(each.biased for each in left_out)),
             }
 
@@ -147,26 +147,33 @@ _SEEDS_OF = {
 
 
 def _levels_at(values, place):
-    """Return the values of a contact by level and seed, and the seeds that each level of the estimate leaves out.
+    """Return the values of a contact by level and seed, the seeds that each level leaves out, and a note.
 
     A level uses only seeds that the cheaper levels also have; a level without any value is not part of the estimate.
+    The asperity model is not used if it has no value for a seed of boundary elements that has one.
     """
-    by_seed, left_out, lacking = {}, [], {}
-    for level, of_level in values.items():
-        by_seed[level] = {}
-        if of_level is None:
-            continue
-        at = (slice(None), *place)
-        causes = {
-            seed: cause or lacking.get(seed, "")
-            for seed, cause in zip(of_level.seeds, of_level.causes[at].tolist(), strict=True)
-        }
-        found = zip(of_level.seeds, of_level.values[at].tolist(), strict=True)
-        by_seed[level] = {seed: float(value) for seed, value in found if not causes[seed]}
+    at = (slice(None), *place)
+    found = {
+        level: {seed: (value, cause) for seed, value, cause in zip(of.seeds, of.values[at], of.causes[at], strict=True)}
+        for level, of in values.items()
+        if of is not None
+    }
+    by_seed, left_out, lacking, note = {level: {} for level in values}, [], {}, ""
+    of_cells = ("coarse", "fine")
+    complete = {seed for level in of_cells for seed, (_, cause) in found.get(level, {}).items() if not cause}
+    of_asperities = {seed: cause for seed, (_, cause) in found.get("asperities", {}).items()}
+    lost = [of_asperities[seed] for seed in complete if of_asperities.get(seed, "") not in ("", *WITHOUT_RUN)]
+    if lost:
+        seeds = f"{len(lost)} seed{'s' * (len(lost) > 1)} of boundary elements"
+        note = f"the asperity model is not used, because it has no value for {seeds} ({lost[0]})"
+        del found["asperities"]
+    for level, of_level in found.items():
+        causes = {seed: cause or lacking.get(seed, "") for seed, (_, cause) in of_level.items()}
+        by_seed[level] = {seed: float(value) for seed, (value, _) in of_level.items() if not causes[seed]}
         if by_seed[level] or level == "fine":
             lacking = causes
             left_out.append(find_left_out(_SEEDS_OF[level], list(causes.values())))
-    return by_seed, left_out
+    return by_seed, left_out, note
 
 
 def _mean_at(of_level, place):

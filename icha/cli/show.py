@@ -121,7 +121,7 @@ def _indenter_test(run) -> str:
     parts = [f"pull-off force {format_quantity(float(run['pull_off_force']), 'N')}"]
     if "pull_off_force_over_jkr" in run:
         parts[0] += f" ({float(run['pull_off_force_over_jkr']):.4g} of JKR)"
-    if "pull_off_force_over_theory" in run:
+    elif "pull_off_force_over_theory" in run:
         parts[0] += f" ({float(run['pull_off_force_over_theory']):.4g} of the theory of the smooth shape)"
     for branch in ("approach", "retraction"):
         if (name := f"work_of_adhesion_{branch}") in run:

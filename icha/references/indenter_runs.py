@@ -37,8 +37,8 @@ def loop_values(
 ) -> dict[str, float]:
     """Return the values of a loop that ends without contact, by variable name; without adhesion only the force.
 
-    Ratios to a theory exist on a half-space: to JKR for shapes with a radius, to Kendall for a cylinder, and to Maugis
-    & Barquins for a cone. Fits of JKR need a radius and enough states.
+    Ratios to theories (`icha.references.indentation.pull_off_state`), and fits of JKR, exist only on a half-space. Fits
+    need a shape with a radius and enough states.
 
     Parameters
     ----------
@@ -53,11 +53,12 @@ def loop_values(
     if largest := loop["largest_contact_area_fraction"]:
         values["loss_over_contact"] = loop["hysteresis_loss"] / (energy * largest)
     radius = sphere_radius(surface)
-    if material.layered:
+    if surface.shape is None or material.layered:
         return values
+    if known := pull_off_state(surface.shape, material.contact_modulus, energy):
+        values["pull_off_force_over_theory"] = pull_off / -float(known.force)
     if radius is None:
-        known = pull_off_state(surface.shape, material.contact_modulus, energy) if surface.shape else None
-        return values | ({"pull_off_force_over_theory": pull_off / -float(known.force)} if known else {})
+        return values
     values["pull_off_force_over_jkr"] = pull_off / (1.5 * math.pi * energy * radius)
     for branch, states in (("approach", first_approach(rows)), ("retraction", last_retraction(rows))):
         work = apparent_work_of_adhesion(states, radius, material.contact_modulus)

@@ -248,8 +248,8 @@ def _pull_off(runs: list[xr.Dataset], has_interval: bool) -> dict:
             **({} if "force" in runs[0] else {"over_summits": mean(values("pull_off_over_summits"))}),
             "detachment": mean(values("detachment_pressure"), "Pa"),
         }
-    units = {"pull_off_force": "N", "pull_off_force_over_jkr": "", "pull_off_force_over_theory": ""}
-    units |= {"work_of_adhesion_approach": "J/m²", "work_of_adhesion_retraction": "J/m²"}
+    units = {"pull_off_force": "N", "pull_off_force_over_theory": "", "work_of_adhesion_approach": "J/m²"}
+    units |= {"work_of_adhesion_retraction": "J/m²"}
     cells |= {name: mean(values(name), unit) for name, unit in units.items() if all(name in run for run in runs)}
     return cells
 

@@ -148,15 +148,25 @@ def test_answers_of_a_lens_are_forces_radii_and_works_of_adhesion():
     assert all(each.unit.endswith("N") for each in rows if each.quantity == "pull-off force")
 
 
-def test_failed_runs_and_those_without_a_model_do_not_count():
+@pytest.mark.parametrize(("lost", "asperities"), [(1, 0), (3, 2)])
+def test_an_asperity_model_that_is_not_applicable_does_not_discard_boundary_elements(lost, asperities):
+    """If the lost seed has boundary elements, they count, and the estimate does without the asperity model."""
+
     def broken(labels, run):
-        bad = labels.seed == 1 and labels.model == "asperities" and labels.material == "soft"
+        bad = labels.seed == lost and labels.model == "asperities" and labels.material == "soft"
         return run.assign_attrs(applicability="the model is not applicable") if bad else run
 
-    runs = [(labels, broken(labels, run)) for labels, run in [*compared.runs().items(), *compared.patches()]]
+    fine = compared.patches(lambda labels: labels.seed < 3)
+    runs = [(labels, broken(labels, run)) for labels, run in [*compared.runs().items(), *fine]]
     study = estimate_campaign(campaign_tree(runs))["one"].to_dataset()
-    counts = set(zip(study["material"].values.tolist(), study["asperity_seeds"].values.tolist(), strict=True))
-    assert counts == {("soft", 2), ("hertz", 3)}
+    found = {name: study[f"{name}_seeds"].values[study["material"].values == "soft"] for name in ("asperity", "fine")}
+    assert set(found["asperity"]) == {asperities} and set(found["fine"]) == {2}
+    assert set(study["asperity_seeds"].values[study["material"].values == "hertz"]) == {3}
+    said = study["left_out"].values[study["material"].values == "soft"][0]
+    assert ("it has no value for 1 seed of boundary elements (outside the range of the model)" in said) == (
+        asperities == 0
+    )
+    assert ("2 of 3 seeds of the asperity model" in said) == (asperities == 2)
 
 
 def test_a_study_without_several_seeds_of_boundary_elements_has_no_answers():
