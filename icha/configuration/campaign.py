@@ -67,6 +67,7 @@ class Topography(NamedTuple):
     complete_contact_pressure : pressure of complete contact without adhesion, divided by E*, at rms slope 1.
     rms_curvature : rms curvature of profiles at rms slope 1, 1/m.
     shortest_wave : shortest wavelength of the surface, m, and whether it is an estimate.
+    repeated_height : description of a height that many points of a scan share; "" without.
     """
 
     grid: int
@@ -78,6 +79,7 @@ class Topography(NamedTuple):
     rms_height: float
     rms_curvature: float
     shortest_wave: tuple[float, bool]
+    repeated_height: str
 
     def slope_of(self, slope: str | RmsHeight) -> float:
         """Return the rms slope for the word `measured`, or the rms slope that gives an rms height."""

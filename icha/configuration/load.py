@@ -102,7 +102,9 @@ def _load(path: Path, origin: str, written: Mapping, within: str | os.PathLike |
     campaign = campaign.with_topographies(topographies)
     for name, each in topographies.items():
         location = "surfaces", campaign.origin("surfaces", name)
-        unusual += unusual_topography(location, campaign.surfaces[name], each.period, each.rms_slope)
+        unusual += unusual_topography(
+            location, campaign.surfaces[name], each.period, each.rms_slope, each.repeated_height
+        )
     unusual += unusual_heights(campaign)
     unusual += negligible_loads(campaign)
     unusual += mirrored_forces(campaign)

@@ -76,15 +76,21 @@ def _number(value, unit):
         return 0.0
 
 
-def unusual_topography(location: tuple, section: Any, period: float, rms_slope: float | None) -> Iterator[Unusual]:
-    """For a topography from a file, yield the size if it is unusual, and the rms slope if it is unusual.
+def unusual_topography(
+    location: tuple, section: Any, period: float, rms_slope: float | None, repeated: str = ""
+) -> Iterator[Unusual]:
+    """For a topography from a file, yield the size, the rms slope and a repeated height if they are unusual.
 
     Parameters
     ----------
     location, section : keys that lead to the surface in the configuration, and the section of the surface.
     period : side of the square, m.
     rms_slope : measured rms slope; None if no study uses the measured slope.
+    repeated : description of a height that many points of a scan share (`repeated_height`).
     """
+    if repeated:
+        expected = "different heights, and nan in the file where a point is missing"
+        yield Unusual((*location, "missing"), repeated, expected, ", because such a number often marks missing points")
     if getattr(section, "size", section) is None and not SIDE.contains(period):
         yield Unusual((*location, "size"), formatting.length(period), SIDE, " in the file")
     if rms_slope is not None and not RMS_SLOPE.contains(rms_slope):

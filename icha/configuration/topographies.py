@@ -60,7 +60,14 @@ def inspect_file(section: MeasuredSurface | FileSurface | SpectrumSurface) -> To
     if key not in _KNOWN:
         from icha.surfaces.resolution import shortest_wave
 
-        surface = read_surface(section)
+        repeated = ""
+        if isinstance(section, MeasuredSurface):
+            from icha.surfaces.measured.defects import repeated_height
+
+            topography = read_topography(section)
+            surface, repeated = _with_shape(topography.surface, section), repeated_height(topography.square.heights)
+        else:
+            surface = read_surface(section)
         slope, height = surface.rms_slope, surface.rms_height
         if isinstance(section, SpectrumSurface):
             # All realisations have the slope and the ratio of height and slope of the spectrum, whatever their seed.
@@ -77,6 +84,7 @@ def inspect_file(section: MeasuredSurface | FileSurface | SpectrumSurface) -> To
             height / slope,
             surface.rms_curvature / surface.rms_slope,
             shortest_wave(surface),
+            repeated,
         )
     return _KNOWN[key]
 
@@ -156,6 +164,7 @@ def read_scan(path: str | os.PathLike, *, confirmed: Collection[str] = (), **key
         If opposite edges of a periodic surface do not fit, or if outliers are kept.
     """
     from icha.configuration.plausibility import plausibility_problems, unusual_topography, unusual_values
+    from icha.surfaces.measured.defects import repeated_height
     from icha.surfaces.measured.settings import UnfitTopography
     from icha.surfaces.measured.topography import defects_of
     from icha.surfaces.surface import MISFIT_OF_EDGES, edges_fit
@@ -175,7 +184,8 @@ def read_scan(path: str | os.PathLike, *, confirmed: Collection[str] = (), **key
         refuse("read_scan", [(location[2:], value, reason) for location, value, reason in map(problem_of, problems)])
     except UnfitTopography as error:
         refuse("read_scan", [((error.key,), section.get(error.key, NOTHING), str(error))])
-    unusual = unusual_topography(("surfaces", "scan"), measured, surface.period, surface.rms_slope)
+    repeated = repeated_height(topography.square.heights)
+    unusual = unusual_topography(("surfaces", "scan"), measured, surface.period, surface.rms_slope, repeated)
     refuse("read_scan", unconfirmed(unusual))
     if not surface.free and not edges_fit(surface.heights):
         warnings.warn(MISFIT_OF_EDGES, IchaWarning, stacklevel=2)

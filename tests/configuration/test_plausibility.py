@@ -114,3 +114,10 @@ def test_a_force_on_a_mirrored_scan_is_refused(load, refused):
     refused("", changes, "expected a pressure, such as 244.1 kPa for this force on one scan")
     (warning,) = load(changes | {"confirmed": ["studies.one.targets.forces"]}).warnings
     assert "four copies of the scan" in warning
+
+
+def test_an_unusual_slope_of_a_spectrum_names_its_unit_of_length(refused, tmp_path):
+    (tmp_path / "table.txt").write_text("1e5 1e-10\n1e6 1e-13\n")
+    spectrum = {"kind": "spectrum", "path": "table.txt", "period": "100 um", "grid": 128}
+    changes = {"surfaces.rough": spectrum, "studies.one.rms_slopes": "measured"}
+    refused("", changes, "add `confirmed: [surfaces.rough.length_unit]`")

@@ -130,3 +130,38 @@ def test_tilted_and_cropped_scans_give_a_warning(cells):
 def test_a_scan_that_is_not_periodic_gives_a_warning(file):
     with pytest.warns(icha.IchaWarning, match="step at the edges"):
         icha.read_scan(file, **KEYS, boundary="periodic")
+
+
+@pytest.mark.parametrize(("share", "asked"), [(0.15, False), (0.3, True)])
+def test_a_number_at_a_fifth_of_the_points_may_mark_missing_points(tmp_path, share, asked):
+    heights = rough() * 1e9 + 2000
+    heights[: round(64 * share)] = 0
+    np.save(tmp_path / "scan.npy", heights)
+    np.save(tmp_path / "levels.npy", np.where(np.indices((64, 64))[0] % 16 < 8, 0, 1000))
+    keys = {**KEYS, "boundary": "free", "confirmed": ["height_unit"]}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of outliers and steps
+        assert icha.read_scan(tmp_path / "levels.npy", **keys).grid == 64
+        if not asked:
+            assert icha.read_scan(tmp_path / "scan.npy", **keys).grid == 64
+            return
+        with pytest.raises(ValueError, match="missing: '30 % of the points at exactly 0 m' is unusual"):
+            icha.read_scan(tmp_path / "scan.npy", **keys)
+        assert icha.read_scan(tmp_path / "scan.npy", **keys | {"confirmed": ["height_unit", "missing"]}).grid == 64
+
+
+@pytest.mark.filterwarnings("error")
+def test_infinite_heights_are_missing_without_warnings(tmp_path):
+    heights = rough() * 1e9
+    heights[10:12, 20:25] = np.inf
+    np.save(tmp_path / "scan.npy", heights)
+    assert np.isfinite(icha.read_scan(tmp_path / "scan.npy", **KEYS, boundary="free", missing="fill").heights).all()
+
+
+def test_rounded_coordinates_ask_for_interpolation(tmp_path):
+    x, y = (np.round(0.126 * each, 1).ravel() for each in np.meshgrid(np.arange(64), np.arange(64)))
+    np.savetxt(tmp_path / "scan.xyz", np.column_stack([x, y, rough().ravel() * 1e9]))
+    keys = {"lateral_unit": "um", "height_unit": "nm", "boundary": "free"}
+    with pytest.raises(ValueError, match=r"scattered: .* lack whole rows or columns, .*; expected interpolate"):
+        icha.read_scan(tmp_path / "scan.xyz", **keys)
+    assert icha.read_scan(tmp_path / "scan.xyz", **keys, scattered="interpolate").grid > 60

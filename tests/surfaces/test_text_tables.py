@@ -266,7 +266,9 @@ def test_blanks_that_may_separate_thousands_are_refused(tmp_path, delimiter, bla
     assert_heights(read(written(tmp_path, text(rows(), f" {delimiter} "))))
 
 
-@pytest.mark.parametrize("entry", ["Z scale: 0.5 nm/LSB", "Z-scale factor = 2.5", "Height gain [V]: 3", "Scaling\t0,1"])
+@pytest.mark.parametrize(
+    "entry", ["Z scale: 0.5 nm/LSB", "1 count = 0.1 nm", "Z-scale factor = 2.5", "Height gain [V]: 3", "Scaling\t0,1"]
+)
 def test_factors_of_heights_in_headings_are_asked_about(tmp_path, entry):
     path = written(tmp_path, text(rows(), " ", [entry, "Zoom factor: 2", "X scale: 3 um", "Z unit: nm"]), "scan.txt")
     with refused("height_unit", "may be a factor of the heights"):

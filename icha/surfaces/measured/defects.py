@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import binary_dilation, binary_erosion, label, mean, median_filter
 
-from icha.support.formatting import format_count
+from icha.support.formatting import format_count, length
 
 # A point is an outlier if its height differs from the median of the 5 x 5 points around it by more than
 # `_OF_NEIGHBOURS` times the usual difference, and by more than `_OF_HEIGHTS` times the usual height.
@@ -16,6 +16,8 @@ _FEWEST_BLOCKS, _EDGE = 8, 3
 # Largest fraction of points that can be replaced. Up to this fraction of single outliers, the error of the rms slope is
 # below 1 % on a surface with 8 points per shortest wave.
 MOST_OUTLIERS = 0.2
+# Largest number of rows and columns in which a repeated height is sought.
+_MOST_EXAMINED = 1000
 # Robust standard deviation of normal values, divided by their median absolute deviation.
 _NORMAL = 1.4826
 # Distance of the 5th and the 95th percentile of normal values, divided by their standard deviation.
@@ -125,6 +127,20 @@ def _with_steep_edge(found, level, high):
     share = mean(binary_dilation(steep, iterations=_EDGE), edge, np.arange(1, count + 1))
     kept = np.concatenate([[False], share > 0.5])[patches]
     return binary_dilation(kept, iterations=_EDGE, mask=high) if kept.any() else kept
+
+
+def repeated_height(heights: np.ndarray) -> str:
+    """Describe the height of more than a fifth of the points, if no other height is a tenth as frequent; "" without.
+
+    Such a number usually marks missing points, or a scan that is saturated. Fewer such points are outliers.
+    """
+    step = max(1, *(points // _MOST_EXAMINED for points in heights.shape))
+    examined = heights[::step, ::step]
+    values, counts = np.unique(examined[np.isfinite(examined)], return_counts=True)
+    *others, most = np.sort(counts)[-2:].tolist() if len(counts) else [0]
+    if most <= MOST_OUTLIERS * examined.size or 10 * max(others, default=0) > most:
+        return ""
+    return f"{100 * most / examined.size:.0f} % of the points at exactly {length(values[np.argmax(counts)])}"
 
 
 def line_offsets(level: np.ndarray) -> dict[str, float]:

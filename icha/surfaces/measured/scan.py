@@ -130,7 +130,9 @@ def load_scan(path: Path, settings: Preparation) -> Scan:
     ]
     format_ = f"{name} ({found.format})" if name == "instrument" else name
     steps = ("; ".join(filter(None, reading)),)
-    scan = Scan(found.heights.astype(float) * unit, tuple(size), steps, format_, found.data)
+    heights = found.heights.astype(float) * unit
+    heights[np.isinf(heights)] = np.nan
+    scan = Scan(heights, tuple(size), steps, format_, found.data)
     if not all(np.isfinite(each) and LENGTH.contains(each) for each in size):
         raise UnfitTopography("size", f"is {size[0]:g} m by {size[1]:g} m in the file; expected the size in this key")
     return scan

@@ -19,7 +19,7 @@ _ROUNDING = 1e-6
 _FACTOR = re.compile(
     r"(?<![a-z])(?:z(?!oom)|heights?|höhe|values?|data|vertical).*"
     r"(?:s[ck]al|fa[ck]tor|gain|resolution|multiplier|sensitivity|calib)"
-    r"|lsb|\A(?:(?:conversion|s[ck]al(?:e|ing|ierung)|fa[ck]tor|multiplier|gain)[\s_]*)+\Z",
+    r"|lsb|\A1\s|\A(?:(?:conversion|s[ck]al(?:e|ing|ierung)|fa[ck]tor|multiplier|gain)[\s_]*)+\Z",
     re.IGNORECASE,
 )
 # Largest distance of a coordinate from its grid line, divided by the distance of the grid lines.

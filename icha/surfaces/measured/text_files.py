@@ -47,7 +47,10 @@ _NUMBER = r"([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)"
 # One length or two, such as 12 µm x 12 µm.
 _LENGTHS = re.compile(rf"{_NUMBER}\s*(\S+?)?(?:\s*[x×*]\s*{_NUMBER}\s*(\S+)?)?$")
 # A line of the heading: a name, then a colon, an equals sign, a delimiter or blanks, then a value.
-_ENTRY = re.compile(r"^[#%/\s'_]*([^\W\d_](?:[^\W\d]|[ ./()\[\]-])*?)\s*(?:[:：=,;\t]\s*|\s+(?=[-+]?\d))(.+?)[\s',;]*$")
+# The name may begin with 1, as in 1 count = 0.1 nm.
+_ENTRY = re.compile(
+    r"^[#%/\s'_]*((?:1\s+)?[^\W\d_](?:[^\W\d]|[ ./()\[\]-])*?)\s*(?:[:：=,;\t]\s*|\s+(?=[-+]?\d))(.+?)[\s',;]*$"
+)
 # Meaning of the names in a heading, in small letters and without punctuation. The words of Gwyddion for width, height,
 # value units and lateral units are those of its languages (msgid in its files po/*.po).
 _NAMES = {
@@ -139,12 +142,21 @@ def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
         raise UnfitTopography("path", LINE_SCAN.format(len(points)))
     scattered = ""
     try:
-        (column, nx, dx), (row, ny, dy) = (grid_indices(points[:, axis], "xy"[axis]) for axis in (0, 1))
+        grid = [grid_indices(points[:, axis], "xy"[axis]) for axis in (0, 1)]
+        require_room(2 * 8 * grid[0][1] * grid[1][1])
+        sparse = any(len(np.unique(index)) < count for index, count, _ in grid)
+        if sparse and (settings.missing == "refuse" or settings.scattered == "interpolate"):
+            raise UnfitTopography(
+                "scattered",
+                f"does not allow coordinates on a grid of {grid[0][1]} x {grid[1][1]} points that lack whole rows or "
+                "columns, as rounded coordinates do; expected interpolate, or `missing: fill` if points are missing",
+            )
     except UnfitTopography:
         if settings.scattered != "interpolate":
             raise
         points, scattered = _interpolate(points)
-        (column, nx, dx), (row, ny, dy) = (grid_indices(points[:, axis], "xy"[axis]) for axis in (0, 1))
+        grid = [grid_indices(points[:, axis], "xy"[axis]) for axis in (0, 1)]
+    (column, nx, dx), (row, ny, dy) = grid
     node = row * nx + column
     order = np.argsort(node, kind="stable")
     repeated = np.flatnonzero(np.diff(node[order]) == 0)
@@ -157,7 +169,6 @@ def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
             f"has {without_place} lines without coordinates, but the grid of the other lines lacks "
             f"{nx * ny - len(points)} points, so the edge of the scan is not known. Remove the lines, or add x and y",
         )
-    require_room(2 * 8 * nx * ny)
     heading = _Heading(layout)
     heights = np.full(nx * ny, np.nan)
     heights[node] = heading.mark_missing(points[:, 2])
