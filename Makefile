@@ -22,7 +22,7 @@ help:
 	@echo "make publish        run that campaign and make its deposit; see docs/howto/publish.md"
 	@echo "make validation     run the campaign validation (two hours) and write the tables and figures of docs/validation.md"
 	@echo "make hysteresis     run the campaign hysteresis (forty minutes) and write the tables and figures of docs/hysteresis.md"
-	@echo "make tamaas         install Tamaas for boundary elements at finite ranges (campaign validation, tests)"
+	@echo "make tamaas         install Tamaas, an independent code, for comparisons in validation and tests"
 	@echo "make test           run the quick tests (three minutes): physics, every rule, wrong input"
 	@echo "make test-all       run all tests: more random cases, kills, resumption, Slurm, a browser, deposits"
 	@echo "make random-cases   run two thousand random cases; make test-all runs a hundred of them (SERIES=7: other ones)"
@@ -65,7 +65,7 @@ tamaas: .venv/.tamaas
 
 # In a separate environment, because the Slurm executor makes every start of Snakemake slower.
 .venv-slurm/.installed: .venv-tools/bin/uv pyproject.toml uv.lock profiles/slurm/executor/pyproject.toml
-	UV_PROJECT_ENVIRONMENT=$(CURDIR)/.venv-slurm .venv-tools/bin/uv sync --quiet --locked --no-default-groups --extra slurm --extra tamaas --python $(PYTHON)
+	UV_PROJECT_ENVIRONMENT=$(CURDIR)/.venv-slurm .venv-tools/bin/uv sync --quiet --locked --no-default-groups --extra slurm --python $(PYTHON)
 	.venv-tools/bin/uv pip install --quiet --no-deps --python .venv-slurm/bin/python --editable profiles/slurm/executor
 	@touch $@
 
@@ -89,8 +89,8 @@ hysteresis: environment
 	python -m validation.hysteresis
 
 indenter: .venv-benchmarks/.installed
-short-range indenter error-sources: tamaas
-applicability: environment
+short-range: tamaas
+indenter error-sources applicability: environment
 short-range indenter error-sources applicability:
 	python -m validation.$(subst -,_,$@) $(OPTIONS)
 
@@ -116,7 +116,7 @@ wheel: .venv-tools/bin/uv
 	rm -rf dist
 	.venv-tools/bin/uv build --quiet
 
-lint: tamaas
+lint: environment
 	ruff check .
 	ruff format --check .
 	lint-imports
@@ -147,11 +147,11 @@ linkcheck: environment
 	-.venv-tools/bin/uv pip install --quiet --python .venv-benchmarks/bin/python -r benchmarks/requirements-aspher.txt
 	@touch $@
 
-benchmarks: tamaas .venv-benchmarks/.installed
+benchmarks: environment .venv-benchmarks/.installed
 	python benchmarks/run.py $(OPTIONS)
 	python -m benchmarks.tables
 
-faults: tamaas
+faults: environment
 	python -m validation.faults $(OPTIONS)
 
 # The validators are in a separate environment, because some of them need an old version of jsonschema.

@@ -10,10 +10,7 @@ LOCAL_FOLDERS = {os.path.realpath(ROOT), os.path.realpath("")}
 REQUESTED = os.environ.get("PYTHONPATH", "").split(os.pathsep)
 sys.path.sort(key=lambda folder: os.path.realpath(folder) in LOCAL_FOLDERS and folder not in filter(None, REQUESTED))
 
-from snakemake.settings.types import DeploymentMethod
 from snakemake.utils import min_version
-
-from icha.planning.requirements import missing_software
 
 min_version("9.17")
 
@@ -42,8 +39,7 @@ else:
 
 onstart:
     before_jobs.start_jobs_freely(workflow)
-    installs = DeploymentMethod.CONDA in workflow.deployment_settings.deployment_method
-    campaign.begin(None if installs else missing_software(CAMPAIGN))
+    campaign.begin()
 
 
 # Remove temporary files of jobs that were killed during this call. The next call may have no jobs.
@@ -102,7 +98,7 @@ rule runs:
 rule references:
     input:
         list(FILES.surfaces),
-        FILES.references,
+        list(FILES.theories),
 
 
 rule dataset:

@@ -16,6 +16,7 @@ from icha.asperity.full_contact import HIGH_PULL_OFF_BELOW, full_contact_energy_
 from icha.asperity.material import Material
 from icha.asperity.stickiness import stickiness
 from icha.checks.run import attributes_of_failure, check_run
+from icha.contact.attraction import attraction_on
 from icha.contact.model import (
     EVENT_KINDS,
     GAP_BINS,
@@ -581,5 +582,7 @@ def _attributes(surface, material, path, name):
         COMPUTED,
         references=f"{model.references}; {_STICKINESS_PAPER}",
     )
+    if model.by_cells:
+        attributes["attraction"] = attraction_on(material, surface.spacing)
     # A campaign sets the attributes that are empty here.
     return attributes | {"contact_model": name} | dict.fromkeys(("campaign", "study", "config_sha256", "license"), "")

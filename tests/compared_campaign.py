@@ -1,4 +1,4 @@
-"""A small campaign with snapshots at common loads, and solutions beside it that differ by known amounts."""
+"""A small campaign with snapshots at common loads, and boundary elements that differ by known amounts."""
 
 import itertools
 from functools import cache
@@ -8,9 +8,10 @@ import small_campaign as small
 import xarray as xr
 
 import icha
-from icha.analysis.model_error import SHARED, contact_of_spots, model_error, state_of
-from icha.datasets.campaign import campaign_tree, find_snapshot
-from icha.datasets.labels import RunLabels, SolutionLabels
+from icha.analysis.model_error import contact_of_spots, model_error
+from icha.contact.attraction import FINITE_RANGE, NO_ATTRACTION, SHORT_RANGE
+from icha.datasets.campaign import campaign_tree
+from icha.datasets.labels import RunLabels
 
 PRESSURES = (3e-3, 1e-2)
 GRID = 96
@@ -32,42 +33,12 @@ def tree():
     return campaign_tree(runs().items(), attrs={"title": "Compared campaign", "summary": "For tests."})
 
 
-def own_solution(run, pressure, *, area=1.0, separation=1.0):
-    """A solution made of the run's own state, with area and separation multiplied by known factors."""
-    at = find_snapshot(run, "reduced_pressure", pressure)
-    state = state_of(run, at)
-    contact = contact_of_spots(run, at, GRID)
-    kept = "gap_density gap_bin_edges pressure_density pressure_bin_mean pressure_bin_edges"
-    return state[[*kept.split(), "seed", "rms_slope", *SHARED]].assign(
-        contact=(("y", "x"), contact.astype(np.int8)),
-        contact_area_fraction=state["contact_area_fraction"] * area,
-        contact_area_fraction_raw=contact.mean(),
-        energetic_area_fraction=state["contact_area_fraction"] * area * 1.2,
-        reduced_separation=state["reduced_separation"] * separation,
-        target_reduced_pressure=pressure,
-        load_error=1e-5,
-        residual=1e-9,
-        grid=GRID,
-    )
-
-
-def solutions(entry="truth", keep=lambda labels: True, *, area=lambda labels: 1.0, separation=1.0):
-    """Solutions of all runs that `keep` names, at all loads; `area` is a function of the run's labels."""
-    return [
-        (
-            SolutionLabels(entry, labels.study, *labels[2:], p),
-            own_solution(run, p, area=area(labels), separation=separation),
-        )
-        for labels, run in runs().items()
-        if keep(labels)
-        for p in PRESSURES
-    ]
-
-
-def own_patches(run, *, area=1.0, separation=1.0):
+def own_patches(run, *, area=1.0, separation=1.0, attraction=SHORT_RANGE):
     """Return a run of boundary elements made from one of asperities: area and separation multiplied, spots as maps."""
     maps = [contact_of_spots(run, k, GRID) for k in range(run.sizes["snapshot"])]
     step = xr.zeros_like(run["reduced_pressure"])
+    attraction = attraction if run["surface_energy"] > 0 else NO_ATTRACTION
+    energetic = {"energetic_area_fraction": run["contact_area_fraction"] * area * 1.2}
     return run.assign(
         resolved_tension=0.1 * run["contact_modulus"],
         contact_area_fraction=run["contact_area_fraction"] * area,
@@ -76,7 +47,8 @@ def own_patches(run, *, area=1.0, separation=1.0):
         gap_residual=step,
         contact_map=(("snapshot", "row", "column"), np.array(maps, np.float32)),
         contact_pressure=(("snapshot", "row", "column"), np.zeros((len(maps), GRID, GRID), np.float32)),
-    ).assign_attrs(contact_model="boundary_elements")
+        **(energetic if attraction == FINITE_RANGE else {}),
+    ).assign_attrs(contact_model="boundary_elements", attraction=attraction)
 
 
 def patches(keep=lambda labels: True, **factors):
@@ -88,6 +60,7 @@ def patches(keep=lambda labels: True, **factors):
     ]
 
 
+@cache
 def tree_of_both(**factors):
     """The campaign with the runs of `patches` as its second model."""
     return campaign_tree([*runs().items(), *patches(**factors)])
@@ -96,33 +69,38 @@ def tree_of_both(**factors):
 AREA_FACTORS = {1: 1.1, 2: 1.2, 3: 1.6}
 
 
-def solutions_of_errors():
+@cache
+def patches_at_finite_range():
     """Boundary elements with more area, by a factor of the seed with adhesion and by a quarter without."""
-    adhesive = solutions(
-        "adhesive", lambda labels: labels.material == "soft", area=lambda labels: AREA_FACTORS[labels.seed]
-    )
-    bare = solutions("bare", lambda labels: labels.material == "hertz", area=lambda labels: 1.25, separation=0.8)
-    return [*adhesive, *bare]
+    return [
+        *(
+            truth
+            for seed, area in AREA_FACTORS.items()
+            for truth in patches(
+                lambda labels, seed=seed: (labels.material, labels.seed) == ("soft", seed),
+                area=area,
+                attraction=FINITE_RANGE,
+            )
+        ),
+        *patches(lambda labels: labels.material == "hertz", area=1.25, separation=0.8),
+    ]
+
+
+@cache
+def tree_at_finite_range():
+    """The campaign with the runs of `patches_at_finite_range` as its second model."""
+    return campaign_tree([*runs().items(), *patches_at_finite_range()])
 
 
 @cache
 def errors():
-    """The error against `solutions_of_errors`, at finite ranges."""
-    return model_error(tree(), solutions_of_errors())
-
-
-@cache
-def short_range_errors():
-    """The error against `solutions_of_errors` and, in the limit of a short range, runs with half as much area again."""
-    return model_error(tree(), solutions_of_errors(), runs=patches(area=1.5, separation=0.9))
+    """The error against `patches_at_finite_range`."""
+    return model_error(tree_at_finite_range(), patches_at_finite_range())
 
 
 def errors_at_own_slopes():
     """The errors of two surfaces, each at a slope of its own, as measured ones are."""
-    parts = {}
-    for name, node in errors().children.items():
-        one = node.to_dataset()
-        other = one.assign_coords(surface=["other"], rms_slope=[0.5])
-        parts[f"/{name}"] = xr.merge([one, other], join="outer", compat="no_conflicts")
-        parts[f"/{name}"].attrs = node.attrs
-    return xr.DataTree.from_dict(parts)
+    one = errors()["one"].to_dataset()
+    other = one.assign_coords(surface=["other"], rms_slope=[0.5])
+    both = xr.merge([one, other], join="outer", compat="no_conflicts")
+    return xr.DataTree.from_dict({"/one": both.assign_attrs(one.attrs)})

@@ -29,7 +29,6 @@ SMOKE = "config/campaigns/smoke.yaml"
 # Figures of the campaign `smoke` in tests, one for each kind of input, and replacements that make its runs smaller.
 FIGURES = ("fig1_jkr", "fig2_area_and_gap", "fig10_model_error", "fig13_loops")
 SMALLER = {
-    "separation_step: 0.3": "separation_step: 0.5",
     "[1.0e-2, 3.16e-2]\n    unload": "[3.16e-3]\n    unload",
     "[3.16e-3, 1.0e-2]\n    turning_points": "[1.0e-3, 3.16e-3]\n    turning_points",
     "pressure: 5.0e-3\n      - reduced_pressure: 1.0e-2": "pressure: 1.5e-3\n      - reduced_pressure: 3.16e-3",
@@ -43,7 +42,7 @@ settings.load_profile("fast")
 # Files with the longest tests, the longest first. If such a file came last, one core would wait for it. With
 # `--dist worksteal` one worker begins with these files and the campaign, the other in the middle of the list.
 LONG = ("one_asperity", "every_case_ends", "full_contact", "slurm", "cli_run", "wheel", "faults", "rough_contacts")
-LONG += ("make", "in_browser", "finite_range_loops", "reruns", "workflow", "finite_range", "energy_balance")
+LONG += ("make", "in_browser", "reruns", "workflow", "energy_balance")
 # Folders of tests whose coverage is measured (`--cov`). Measuring it nearly doubles the time of a test.
 PHYSICS = {"asperity", "boundary_elements", "contact", "equilibrium", "half_space", "path", "surfaces"}
 
@@ -119,17 +118,9 @@ def _call(project, arguments, environment, output):
             sys.modules["fingerprint"].save_cache()  # a fork runs no `atexit` handlers
 
 
-def smoke_at_finite_ranges():
-    """Return the text of the campaign `smoke` with the sections that Tamaas solves."""
-    text = (REPOSITORY / SMOKE).read_text(encoding="utf-8")
-    assert text.count("figures:\n") == 1
-    sections = (REPOSITORY / "tests/finite_ranges.yaml").read_text(encoding="utf-8")
-    return text.replace("figures:\n", f"{sections}figures:\n")
-
-
 def smaller_smoke():
-    """Return `smoke_at_finite_ranges` with smaller runs and fewer figures."""
-    text = smoke_at_finite_ranges()
+    """Return the text of the campaign `smoke` with smaller runs and fewer figures."""
+    text = (REPOSITORY / SMOKE).read_text(encoding="utf-8")
     for large, small in SMALLER.items():
         assert large in text
         text = text.replace(large, small)

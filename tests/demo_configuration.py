@@ -37,8 +37,6 @@ studies:
 GOOD_RUN = "one/rough/seed1/slope0.2/soft"
 ORCID = "0000-0002-1825-0097"
 CARBERRY = {"family_names": "Carberry", "given_names": "Josiah"}
-TRUTH = {"study": "one", "reduced_pressures": [0.003, 0.01]}
-LONG_RANGE = {"materials.soft.interaction_range": "120 nm"}
 
 
 def measured_surface(**changes):

@@ -12,13 +12,11 @@ from icha.datasets.campaign_file import write_campaign
 from icha.datasets.files import read_campaign, write_dataset
 from icha.datasets.labels import RunLabels
 from icha.datasets.surface_file import write_surface
-from icha.references.finite_range import finite_range_solution
-from icha.references.finite_range_loops import finite_range_loop
 from icha.references.theories import reference_dataset
 from icha.surfaces.moments import spectral_moments
 
 HARD = icha.Material(contact_modulus=1e9, surface_energy=0.0, interaction_range=1e-8)
-# Its attraction reaches far enough for the grid of the small surface.
+# The grid of the small surface resolves its range of attraction.
 STICKY = icha.Material(contact_modulus=25e6, surface_energy=0.05, interaction_range=0.6e-6)
 ATTRIBUTES = {"campaign": "small", "license": "CC0-1.0", "config_sha256": "0" * 64}
 PUBLISHED = {
@@ -35,6 +33,12 @@ def cycle():
     """A run in and back, with events."""
     path = icha.Path(reduced_pressures=[5e-4, 1e-3], unload=True, max_step=0.5)
     return icha.simulate(small.surface(), small.MATERIALS["soft"], path, seed=1)
+
+
+def boundary_elements(material):
+    """A run with boundary elements."""
+    path = icha.Path(reduced_pressures=[1e-2])
+    return icha.simulate(small.surface(), material, path, seed=1, model="boundary_elements")
 
 
 def incomplete(run):
@@ -62,9 +66,8 @@ def write_all(folder: Path) -> list[Path]:
         "theories": reference_dataset(
             small.SPECTRUM, spectral_moments(surface), {(1.0, "soft"): small.MATERIALS["soft"]}
         ),
-        "boundary_elements": finite_range_solution(surface, HARD, 1e-2, seed=1),
-        "boundary_elements_adhesive": finite_range_solution(surface, STICKY, 1e-2, seed=1),
-        "loop": finite_range_loop(surface, STICKY, largest_reduced_pressure=1e-2, separation_step=0.3, seed=1),
+        "boundary_elements": boundary_elements(HARD),
+        "boundary_elements_adhesive": boundary_elements(STICKY),
     }
     for name, data in datasets.items():
         write_dataset(data.assign_attrs(ATTRIBUTES), folder / f"{name}.nc")

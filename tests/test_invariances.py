@@ -7,7 +7,6 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
-from icha.boundary_elements import transforms
 from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
 from icha.path.targets import EVENT_ERROR_OVER_LOSS
 from icha.support import parallel
@@ -177,8 +176,7 @@ def test_threads_change_no_bit(model, data):
     surface, material = data.draw(contacts(model))
     found = set()
     with pytest.MonkeyPatch.context() as patch:
-        # Boundary elements work on small grids by blocks and threads, as on large ones.
-        patch.setattr(transforms, "CACHE", 1000)
+        # Asperities work on small grids by threads, as on large ones.
         patch.setattr(parallel, "LARGE_GRID", 0)
         for threads in ("1", "3"):
             patch.setenv("OMP_NUM_THREADS", threads)

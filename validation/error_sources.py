@@ -35,15 +35,15 @@ from threadpoolctl import threadpool_limits
 
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
+from icha.boundary_elements.contact import contact_of
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.path.follow import follow
 from icha.path.targets import Path
-from icha.references.finite_range import NodalState, contact_state, perimeter_correction
 from icha.surfaces.spectrum import SelfAffineSpectrum
 from icha.surfaces.summits import find_summits
 from icha.surfaces.surface import Surface
 from validation.paraboloids import circular_curvatures, paraboloids, summit_curvatures
-from validation.spot_by_spot import compare_single_spots
+from validation.spot_by_spot import compare_single_spots, contact_patches
 from validation.without_unions import discs_apart, independent_discs, union_area_fraction
 
 # Variants from the model to boundary elements, with the change of each step. With adhesion the model is not solved
@@ -96,15 +96,11 @@ def error_sources(surface: Surface, material: Material, reduced_pressures) -> xr
         states[name] = list(solved)
         print(f"{name}: A/A0 = {', '.join(f'{state.area:.4e}' for state in states[name])}", flush=True)
 
-    def solve(refinement):
-        return [contact_state(surface, material, p, refinement=refinement) for p in pressures]
-
     # One thread for linear algebra, so that the order of sums, and every bit, does not depend on the machine.
     with threadpool_limits(1):
         contact, model = _model(surface, material, path)
-        keep("icha", (State(contact.area_fraction(state), state.separation) for state in model))
-        fine, of_fine = _model(surface.refined(2), material, path)
-        keep("icha_fine_grid", (State(fine.area_fraction(state), state.separation) for state in of_fine))
+        keep("icha", _results(contact, model))
+        keep("icha_fine_grid", _results(*_model(surface.refined(2), material, path)))
         if not contact.adhesive:
             for name, discs in _without_unions(contact, surface, pressures):
                 keep(name, (State(union_area_fraction(one, surface), one.separation) for one in discs))
@@ -113,20 +109,42 @@ def error_sources(surface: Surface, material: Material, reduced_pressures) -> xr
             ("elliptic_paraboloids", summit_curvatures(surface, contact.asperities)),
         ):
             heights = paraboloids(contact.asperities, curvatures, _REFINEMENT * surface.grid)
-            keep(name, (_solve_paraboloids(heights, surface, material, p) for p in pressures))
-        keep("boundary_elements_coarse", map(_state_at_nodes, solve(_REFINEMENT // 2)))
-        truth = solve(_REFINEMENT)
-        keep("boundary_elements", map(_state_at_nodes, truth))
+            keep(name, _solve_paraboloids(heights, surface, material, pressures))
+        keep(
+            "boundary_elements_coarse", _results(*_boundary_elements(surface.refined(_REFINEMENT // 2), material, path))
+        )
+        fine = surface.refined(_REFINEMENT)
+        elements, truth = _boundary_elements(fine, material, path)
+        keep("boundary_elements", _results(elements, truth))
         if not contact.adhesive:
-            singles = [compare_single_spots(contact, state, true) for state, true in zip(model, truth, strict=True)]
+            singles = [
+                compare_single_spots(contact, state, fine, contact_patches(elements, true))
+                for state, true in zip(model, truth, strict=True)
+            ]
     return _dataset(surface, material, pressures, states, singles)
 
 
 def _model(surface, material, path):
     """Return the contact problem and the states of the model at the targets of the path."""
     contact = InteractingAsperities(JKR(material), find_summits(surface), surface.rms_height, surface.rms_slope)
+    return contact, _states(contact, path)
+
+
+def _boundary_elements(surface, material, path):
+    """Return the contact problem and the states of boundary elements at the targets of the path."""
+    contact = contact_of(surface, material)
+    return contact, _states(contact, path)
+
+
+def _states(contact, path):
+    """Return the states of a contact at the targets of a path."""
     met = {waypoint.target: waypoint.state for waypoint in follow(contact, path)}
-    return contact, [met[target] for target in path.targets]
+    return [met[target] for target in path.targets]
+
+
+def _results(contact, states):
+    """Yield area and separation of some states."""
+    return (State(contact.area_fraction(state), state.separation) for state in states)
 
 
 def _without_unions(contact, surface, reduced_pressures):
@@ -138,16 +156,12 @@ def _without_unions(contact, surface, reduced_pressures):
         yield name, [discs_apart(summits, law, p, surface.rms_height, field_shape=shaped) for p in loads]
 
 
-def _state_at_nodes(state: NodalState) -> State:
-    return State(perimeter_correction(state.contact)[0], state.mean_separation)
-
-
-def _solve_paraboloids(heights, surface, material, reduced_pressure):
-    """Solve the same load on other heights; the separation is that of the mean plane of the surface."""
+def _solve_paraboloids(heights, surface, material, reduced_pressures):
+    """Yield the results at the same loads on other heights; separations are from the mean plane of the surface."""
     other = Surface(heights, surface.period)
-    reduced_pressure = reduced_pressure * surface.rms_slope / other.rms_slope
-    state = _state_at_nodes(contact_state(other, material, reduced_pressure))
-    return state._replace(separation=state.separation + float(np.mean(heights)))
+    path = Path(reduced_pressures=[p * surface.rms_slope / other.rms_slope for p in reduced_pressures])
+    for state in _results(*_boundary_elements(other, material, path)):
+        yield state._replace(separation=state.separation + float(np.mean(heights)))
 
 
 def _dataset(surface, material, pressures, states, singles):

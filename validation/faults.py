@@ -357,7 +357,7 @@ def disturb_by_full_disk(reference: Reference, place: Place, number: int, chance
 KINDS = {
     "surface": "surfaces/rough/seed1.nc",
     "run": "runs/load/rough/seed1/slope1/soft.nc",
-    "boundary elements": "references/boundary_elements/truth/rough/seed1/slope1/bare/p0.01.nc",
+    "boundary elements": "runs/load/rough/seed1/slope1/boundary_elements/soft.nc",
     "theories": "references/rough.nc",
     "campaign dataset": f"dataset/{CAMPAIGN}.nc",
     "comparison": f"aggregated/{CAMPAIGN}.nc",

@@ -6,8 +6,12 @@ Approaches are those of the summit to the mean plane of the cell.
 
 The law of Johnson, Kendall and Roberts (Proc. R. Soc. Lond. A 324 (1971) 301, doi:10.1098/rspa.1971.0141) is the limit
 of a vanishing range, that is of a large Tabor parameter (D. Tabor, J. Colloid Interface Sci. 58 (1977) 2). At a finite
-range boundary elements have two areas, that of zero gap and the energetic one (see `icha.references.finite_range`); the
-area of the law is compared with both.
+range boundary elements have two areas, that of zero gap and the energetic one, the integral of exp(-u/rho); the area of
+the law is compared with both. The boundary elements are those of Tamaas (`validation.tamaas_oracle`).
+
+A grid resolves the attraction if its spacing is at most the length of the cohesive zone, 8 rho^2 E*/(3 pi dgamma), and
+if nodes do not jump into contact one at a time: sqrt(dgamma dx/E*)/rho < 1/2 (A. Wang, Y. Zhou and M. H. Müser,
+Lubricants 9 (2021) 17, doi:10.3390/lubricants9020017).
 
 `python -m validation.one_asperity` takes some ten minutes and writes the tables of docs/validation.md, "One asperity".
 """
@@ -19,30 +23,37 @@ import numpy as np
 import scipy.fft
 import xarray as xr
 
-from icha.asperity.cohesive_zone import resolution_problem, strength_number
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
 from icha.contact.model import PRESSURE, Control
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.half_space.interaction import displacement_at
-from icha.references.finite_range import GapContact, NodalState, contact_state, perimeter_correction, refine
 from icha.surfaces.summits import find_summits
 from icha.surfaces.surface import Surface
 from validation.single_contacts import force_and_area
 from validation.surfaces import paraboloid
 from validation.tables import Table, percent, write_tables
+from validation.tamaas_oracle import OracleState, contact_at_load, contacts_at_gaps
 
 # Relative tolerance of the boundary elements, with which forces and areas are right to a few parts in 1e5.
 _TOLERANCE = 1e-6
 # Least nodes along a side, so that the contact spans some nodes at any range.
 _LEAST_GRID = 64
+# Limit of the number sqrt(dgamma dx/E*)/rho, above which nodes jump into contact one at a time.
+MAX_STRENGTH_NUMBER = 0.5
 _PULL_OFF = 1.5 * math.pi
+
+
+def strength_number(material: Material, spacing: float) -> float:
+    """Return sqrt(dgamma dx/E*)/rho for a spacing dx, m: the distance over which one node jumps, divided by rho."""
+    return math.sqrt(material.adhesion_length * spacing) / material.interaction_range
 
 
 def resolving_grid(material: Material, period: float) -> int:
     """Return the least number of nodes along a period (m) that resolves the attraction and is fast to transform."""
+    zone = 8 * material.interaction_range**2 / (3 * math.pi * material.adhesion_length)
     grid = _LEAST_GRID
-    while resolution_problem(material, period / grid):
+    while period / grid > zone or strength_number(material, period / grid) >= MAX_STRENGTH_NUMBER:
         grid = scipy.fft.next_fast_len(grid + 1, real=True)
     return grid
 
@@ -71,8 +82,8 @@ def one_asperity(
     material = Material(1.0, 1.0, 1 / tabor_parameter)
     surface = paraboloid(resolving_grid(material, period), period)
     all_approaches = (*approaches, *([pull_off_approach(JKR(material), period)] if to_pull_off else []))
-    tamaas = GapContact(refine(surface, material, 1), material, _TOLERANCE)
-    states = (tamaas.solve(surface.heights.max() - approach) for approach in all_approaches)
+    gaps = (surface.heights.max() - approach for approach in all_approaches)
+    states = contacts_at_gaps(surface, material, gaps, _TOLERANCE)
     return _comparison(surface, material, states, len(approaches))
 
 
@@ -80,10 +91,9 @@ def hertz_asperity() -> xr.Dataset:
     """Compare without adhesion, at the loads of the contact radii 1 m and 0.5 m by Hertz's law."""
     material = Material(1.0, 0.0, 1.0)
     surface = paraboloid(512, 16.0)
-    unit = surface.rms_slope * surface.period**2
-    loads = [float(JKR(material).force(radius, 1.0)) / unit for radius in (1.0, 0.5)]
-    states = (contact_state(surface, material, load, tolerance=_TOLERANCE) for load in loads)
-    return _comparison(surface, material, states, len(loads))
+    pressures = [float(JKR(material).force(radius, 1.0)) / surface.period**2 for radius in (1.0, 0.5)]
+    states = (contact_at_load(surface, material, pressure, _TOLERANCE) for pressure in pressures)
+    return _comparison(surface, material, states, len(pressures))
 
 
 def pull_off_approach(law: JKR, period: float) -> float:
@@ -96,7 +106,7 @@ def pull_off_approach(law: JKR, period: float) -> float:
     return float(displacement_at(law, period, summit, summit, a, R)[0])
 
 
-def _comparison(surface: Surface, material: Material, states: Iterable[NodalState], loaded: int) -> xr.Dataset:
+def _comparison(surface: Surface, material: Material, states: Iterable[OracleState], loaded: int) -> xr.Dataset:
     """Compare at the approaches of the boundary elements' states, and at the loads of the first `loaded` of them."""
     pull_off = _PULL_OFF * material.surface_energy
     nominal, top = surface.period**2, float(surface.heights.max())
@@ -104,10 +114,11 @@ def _comparison(surface: Surface, material: Material, states: Iterable[NodalStat
     model = contact.untouched()
     rows, at_load = [], []
     for index, state in enumerate(states):
-        approach, force = top - state.mean_separation, state.nominal_pressure * nominal
-        zero_gap = perimeter_correction(state.contact)[0] * nominal
-        energetic = state.energetic_area_fraction(material) * nominal
-        model = contact.equilibrium(model, state.mean_separation)
+        separation = float(state.gap.mean())
+        approach, force = top - separation, float(state.traction.mean()) * nominal
+        zero_gap = state.area_fraction * nominal
+        energetic = float(np.mean(np.exp(-state.gap / material.interaction_range))) * nominal
+        model = contact.equilibrium(model, separation)
         rows.append((approach, force, zero_gap, energetic, *force_and_area(contact, model)))
         if index < loaded and force > -pull_off:
             at_given_load = contact.equilibrium(model, model.separation, Control(PRESSURE, force / nominal))

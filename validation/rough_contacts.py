@@ -1,4 +1,4 @@
-"""Boundary elements in the limit of short range on rough surfaces: against themselves, and against Tamaas.
+"""Boundary elements on rough surfaces: against themselves, and without adhesion against Tamaas.
 
 The surfaces are self-affine; lengths in m, pressures in Pa. The functions give rows, dictionaries of numbers for JSON.
 """
@@ -12,7 +12,6 @@ from icha.boundary_elements.contact import BoundaryElements, contact_of
 from icha.contact.model import PRESSURE, Control
 from icha.path.follow import follow
 from icha.path.targets import Path
-from icha.references.finite_range import GapContact, contact_state, perimeter_correction, refine
 from icha.surfaces.spectrum import SelfAffineSpectrum
 from icha.surfaces.surface import Surface
 
@@ -142,50 +141,43 @@ def without_adhesion(surface: Surface, reduced_pressures: Sequence[float]) -> It
 
     `gap_error` is the rms difference of the gaps over h_rms; areas are counts of nodes.
     """
+    from validation.tamaas_oracle import contact_at_load  # needs Tamaas
+
     contact = contact_of(surface, HARD)
     for p in reduced_pressures:
-        theirs = contact_state(surface, HARD, p, tolerance=1e-10)
         load = p * surface.rms_slope * HARD.contact_modulus
-        state = contact.equilibrium(contact.untouched(), theirs.mean_separation)
-        state = contact.equilibrium(state, state.separation, Control(PRESSURE, load))
+        theirs = contact_at_load(surface, HARD, load, 1e-10)
+        separation = float(theirs.gap.mean())
+        state = contact.equilibrium(contact.untouched(), separation)
+        state = contact.equilibrium(state, separation, Control(PRESSURE, load))
         gap = contact.gap(state)
         yield {
             "grid": surface.grid,
             "reduced_pressure": p,
-            "separation_error": state.separation / theirs.mean_separation - 1,
+            "separation_error": state.separation / separation - 1,
             "gap_error": float(np.sqrt(np.mean((gap - theirs.gap) ** 2))) / surface.rms_height,
-            "area_error": len(state.cells) / np.count_nonzero(theirs.contact) - 1,
+            "area_error": len(state.cells) / np.count_nonzero(theirs.traction > 0) - 1,
         }
 
 
 def towards_short_range(
     surface: Surface, separations: Sequence[float], lengths: Sequence[tuple[float, int]], surface_energy: float
 ) -> Iterator[dict]:
-    """Solve falling separations (h_rms) with Tamaas at given ranges (m), each with its refinement, and in the limit.
+    """Solve falling separations (h_rms) at given ranges (m) on refined grids that resolve them, and in the limit.
 
-    The material of the limit has the shortest range, which affects only jumps into contact.
+    Each range has its refinement. The limit has the shortest range, on the grid of the surface.
     """
-    for length, refinement in lengths:
-        material = Material(SOFT.contact_modulus, surface_energy, length)
-        tamaas = GapContact(refine(surface, material, refinement), material, 1e-6)
-        for u in separations:
-            state = tamaas.solve(u * surface.rms_height)
+    shortest = min(length for length, _ in lengths)
+    for length, refinement in (*lengths, (0.0, 1)):
+        material = Material(SOFT.contact_modulus, surface_energy, length or shortest)
+        contact = contact_of(surface.refined(refinement), material)
+        for u, state in zip(separations, states_at(contact, separations), strict=True):
+            area = contact.area_fraction(state)
             yield {
                 "range": length,
                 "grid": surface.grid * refinement,
                 "separation": u,
-                "pressure": state.nominal_pressure / (material.contact_modulus * surface.rms_slope),
-                "zero_gap_area": float(perimeter_correction(state.contact)[0]),
-                "energetic_area": float(state.energetic_area_fraction(material)),
+                "pressure": contact.pressure(state) / (material.contact_modulus * surface.rms_slope),
+                "zero_gap_area": area,
+                "energetic_area": contact.energetic_area_fraction(state) if length else area,
             }
-    material = Material(SOFT.contact_modulus, surface_energy, min(length for length, _ in lengths))
-    contact = contact_of(surface, material)
-    for u, state in zip(separations, states_at(contact, separations), strict=True):
-        yield {
-            "range": 0.0,
-            "grid": surface.grid,
-            "separation": u,
-            "pressure": contact.pressure(state) / (material.contact_modulus * surface.rms_slope),
-            "zero_gap_area": contact.area_fraction(state),
-            "energetic_area": contact.area_fraction(state),
-        }

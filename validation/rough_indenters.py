@@ -17,7 +17,8 @@ import xarray as xr
 
 from icha import Material, Path, SelfAffineSpectrum, Surface, simulate
 from icha.boundary_elements.contact import contact_of
-from icha.boundary_elements.half_space import Layer, layer_compliance, wave_numbers
+from icha.boundary_elements.elastic import wave_numbers
+from icha.half_space.layer import Layer, layer_compliance
 from icha.references.jkr_fits import fit_work_of_adhesion
 from icha.surfaces.shapes import Paraboloid
 from validation.indenter_contacts import ADHESIVE, BARE, PULL_OFF

@@ -26,7 +26,7 @@ from validation.tables import Table, by, percent, write_tables
 
 RESULTS = Path(__file__).resolve().parent / "results/short_range"
 _OFFSETS = tuple(single.offsets(5))
-# Ranges (m) and refinements for Tamaas, which resolve the attraction for dgamma/E* = 20 nm and waves from 6.25 um on.
+# Ranges (m), and refinements of the grid that resolve them, for dgamma/E* = 20 nm and waves from 6.25 um on.
 _RANGES = ((400e-9, 1), (283e-9, 2), (200e-9, 2), (141e-9, 4), (100e-9, 8))
 
 
@@ -214,7 +214,7 @@ def towards_zero(rows: list[dict]) -> Table:
         weight = last["range"] / (before["range"] - last["range"])
         at_zero = {name: last[name] + weight * (last[name] - before[name]) for name in names}
         labelled = [(f"{1e9 * row['range']:.0f} nm", f"{row['grid']}²", row) for row in finite]
-        for label, grid, row in (*labelled, ("→ 0", "", at_zero), ("0 (ours)", f"{limit['grid']}²", limit)):
+        for label, grid, row in (*labelled, ("→ 0", "", at_zero), ("limit", f"{limit['grid']}²", limit)):
             lines.append([f"{separation:g}", label, grid, *(f"{row[name]:.4g}" for name in names)])
     return Table(["u/h_rms", "range", "grid", *names.values()], lines)
 

@@ -3,13 +3,12 @@
 from typing import NamedTuple
 
 import numpy as np
-import scipy.ndimage
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
+from icha.boundary_elements.contact import BoundaryElements
+from icha.boundary_elements.patches import CellState, label_patches
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.equilibrium.sites import ContactState
-from icha.references.finite_range import NodalState, perimeter_correction
+from icha.surfaces.surface import Surface
 from validation.paraboloids import fourth_order_terms
 
 
@@ -29,26 +28,16 @@ class Patches(NamedTuple):
     nodes: np.ndarray
 
 
-def contact_patches(state: NodalState) -> Patches:
+def contact_patches(contact: BoundaryElements, state: CellState) -> Patches:
     """Return the connected patches of a state without adhesion, with areas corrected by their perimeters."""
-    contact, period = state.contact, state.surface.period
-    label, count = scipy.ndimage.label(contact)
-    # Patches are periodic.
-    seam = np.concatenate([np.stack([label[0], label[-1]]), np.stack([label[:, 0], label[:, -1]])], axis=1)
-    seam = seam[:, np.all(seam > 0, axis=0)]
-    _, whole = connected_components(coo_array((np.ones(seam.shape[1]), seam), shape=(count + 1, count + 1)))
-    label, count = whole[label], int(whole.max())  # the background has label 0 and comes first
-    nodes = np.bincount(label.ravel(), minlength=count + 1)
-    edges = np.zeros(count + 1)
-    for axis in (0, 1):
-        other = np.roll(label, 1, axis)
-        edges += np.bincount(np.maximum(label, other)[(label > 0) != (other > 0)], minlength=count + 1)
-    corrected, perimeter = perimeter_correction(contact)
-    excess = np.count_nonzero(contact) - corrected * contact.size
-    force = np.bincount(label.ravel(), state.traction.ravel(), count + 1)
-    cell = (period / len(label)) ** 2
-    area = nodes - excess * edges / max(perimeter, 1.0)
-    return Patches(label, area[1:] * cell, force[1:] * cell, nodes[1:])
+    grid, cell = contact.space.grid, contact.spacing**2
+    labels, count = label_patches(state.cells, grid)
+    label = np.zeros((grid, grid), int)
+    label.ravel()[state.cells] = labels
+    area, force = (
+        np.bincount(labels, values, count + 1)[1:] * cell for values in (contact.area_of_cells(state), state.pressure)
+    )
+    return Patches(label, area, force, np.bincount(labels, minlength=count + 1)[1:])
 
 
 def match(position, contact_radius, united, patches: Patches, period: float) -> tuple[np.ndarray, np.ndarray]:
@@ -85,10 +74,10 @@ def _nodes_in_disc(centre, radius, grid, period):
 
 
 def compare_single_spots(
-    contact: InteractingAsperities, state: ContactState, truth: NodalState
+    contact: InteractingAsperities, state: ContactState, surface: Surface, patches: Patches
 ) -> dict[str, np.ndarray]:
     """Compare the single spots of one state without adhesion with their patches, by the names of the variables."""
-    spots, patches = state.spots, contact_patches(truth)
+    spots = state.spots
     single, patch = match(spots.position, spots.contact_radius, spots.members > 1, patches, contact.asperities.period)
     return {
         "pair_spot_area": np.pi * spots.contact_radius[single] ** 2,
@@ -97,5 +86,5 @@ def compare_single_spots(
         "pair_patch_nodes": patches.nodes[patch],
         "pair_curvature_radius": spots.radius_of_curvature[single],
         # The centre of a single spot is its summit.
-        "pair_fourth_order": fourth_order_terms(truth.surface, spots.position[single]),
+        "pair_fourth_order": fourth_order_terms(surface, spots.position[single]),
     }

@@ -162,21 +162,17 @@ class CampaignResults:
                 aside = f" (the old file is {checksums.set_aside(self.results, path).name})"
         _warn(f"{why}, to be made again: {file}{aside}")
 
-    def begin(self, missing: str | None = None) -> None:
+    def begin(self) -> None:
         """Make this call the owner of the results before its first job starts.
 
         Afterwards, jobs of an earlier call cannot change the results. The results are inspected again, because jobs of
         an earlier call may have changed results since the first inspection. Calls that only report do not use this
         method.
 
-        Parameters
-        ----------
-        missing : message about missing software.
-
         Raises
         ------
         SystemExit
-            If another process runs the campaign, results cannot be written or read, or software is missing.
+            If another process runs the campaign, or results cannot be written or read.
         """
         self._refuse_second()
         if "\\" in os.path.abspath(self.results):
@@ -185,8 +181,6 @@ class CampaignResults:
                 f"results could not be read. Nothing was computed. Rename the folder, or {ANOTHER_FOLDER}."
             )
         self._refuse_unwritable()
-        if missing:
-            raise SystemExit(f"{missing} Nothing was computed.")
         with _writing(".snakemake"):
             take_over(f".snakemake/{Path(self.results).name}.owner")
         if changed := checksums.damaged(self.results):

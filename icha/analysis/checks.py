@@ -1,16 +1,15 @@
-"""Check campaigns and boundary-element solutions with equalities and bounds that datasets must satisfy."""
+"""Check campaigns with equalities and bounds that datasets must satisfy."""
 
 import json
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
-from icha.asperity.cohesive_zone import MAX_STRENGTH_NUMBER
-from icha.checks.findings import IDENTITY_LIMIT, Check, Finding, compare_with_limit, count_not_finite
+from icha.checks.findings import Check, compare_with_limit
 from icha.checks.run import check_variables
 from icha.datasets.attributes import why_failed, why_no_result
 from icha.datasets.campaign import run_labels, variables_of_run
@@ -18,8 +17,6 @@ from icha.datasets.labels import RunLabels
 from icha.datasets.variables.campaign import MISSING
 from icha.support.atomic_files import whole_file
 
-# Largest relative error of a load. The search for the mean gap stops if this error is at most 2e-4.
-LOAD_LIMIT = 1e-3
 # Name of the check that a run reached the end of its path and passed the checks of its job.
 COMPLETED = "completed"
 
@@ -62,45 +59,6 @@ def check_campaign(tree: xr.DataTree, expected: Iterable[RunLabels | tuple] | No
             continue  # no state was reached
         checks.extend(check_variables(variables, attrs, str(labels)))
     return tuple(checks)
-
-
-def check_solution(solution: xr.Dataset, subject: str = "") -> tuple[Check, ...]:
-    """Check a boundary-element solution: finite values, convergence, load, resolution by the grid, and consistency.
-
-    Parameters
-    ----------
-    solution : dataset from `icha.references.finite_range.finite_range_solution`.
-    subject : name of the solution in the checks.
-    """
-    found = _findings(solution)
-    return tuple(compare_with_limit(f"boundary elements: {name}", *rest, subject) for name, *rest in found)
-
-
-def _findings(solution) -> Iterator[Finding]:
-    """Yield name, value, limit and description of each check of a boundary-element solution."""
-    values = (variable.values for variable in solution.variables.values())
-    yield "finite", count_not_finite(values), 0, "number of values that are not finite"
-    converged = float(solution["residual"]) / float(solution["tolerance"])
-    yield "converged", converged, 1, "residual of the solver, divided by its tolerance"
-    unit = float(solution["contact_modulus"]) * float(solution["rms_slope"])
-    target, nominal = float(solution["target_reduced_pressure"]) * unit, float(solution["nominal_pressure"])
-    yield "load", abs(nominal / target - 1), LOAD_LIMIT, "relative error of the load"
-    strength = float(solution["strength_number"])
-    words = "sqrt(dgamma dx/E*)/range of attraction, where dx is the grid spacing; 0 without adhesion"
-    yield "resolved", strength, MAX_STRENGTH_NUMBER, words
-
-    gaps = solution["gap_density"].values * np.diff(solution["gap_bin_edges"].values)
-    pressures = solution["pressure_density"].values * np.diff(solution["pressure_bin_edges"].values)
-    loads, area = pressures * solution["pressure_bin_mean"].values, float(solution["contact_area_fraction_raw"])
-    complete = abs(gaps.sum() + area - 1)
-    words = "integral of P(u) over u, plus the fraction of nodes in contact, minus 1"
-    yield "P(u) complete", complete, IDENTITY_LIMIT, words
-    from_pressures = abs(pressures.sum() - area) / max(area, np.finfo(float).tiny)
-    words = "integral of P(p) over p, divided by the fraction of nodes in contact, minus 1"
-    yield "area from P(p)", from_pressures, IDENTITY_LIMIT, words
-    load = abs(loads.sum() + float(solution["outside_pressure"]) - nominal) / max(np.abs(loads).sum(), target)
-    words = "F/A0 minus (integral of p P(p) over p plus mean traction outside contact), divided by mean |p|"
-    yield "load from P(p)", load, IDENTITY_LIMIT, words
 
 
 def worst(checks: Iterable[Check]) -> tuple[Check, ...]:

@@ -6,13 +6,12 @@ import xarray as xr
 from icha.analysis.left_out import NOT_COMPARED, NOT_REQUESTED, LeftOut, find_left_out
 from icha.analysis.validity import Statement
 from icha.datasets.variables.campaign import COMPLETE, NOT_IN_DESIGN
-from icha.datasets.variables.model_error import SHORT_RANGE
 
 _QUANTITIES = {"area_error": "contact area", "separation_error": "mean separation"}
 
 
 def measured_errors(model_error: xr.DataTree) -> dict[str, Statement]:
-    """Return a statement for each study whose error is measured in the limit of a short range, by name of the study.
+    """Return a statement for each study whose error is measured, by name of the study.
 
     Parameters
     ----------
@@ -21,7 +20,7 @@ def measured_errors(model_error: xr.DataTree) -> dict[str, Statement]:
     found = {}
     for name, node in model_error.children.items():
         errors = node.to_dataset()
-        if errors.attrs.get("truth") != SHORT_RANGE or not np.isfinite(errors["area_error"]).any():
+        if not np.isfinite(errors["area_error"]).any():
             continue
         ranges = ", ".join(f"{words} {_range(errors[variable].values)}" for variable, words in _QUANTITIES.items())
         known = np.isfinite(errors["area_error"])
@@ -36,7 +35,7 @@ def measured_errors(model_error: xr.DataTree) -> dict[str, Statement]:
 
 
 def left_out_runs(errors: xr.Dataset) -> LeftOut:
-    """Describe the requested runs of an entry for which the models are not compared at any load."""
+    """Describe the requested runs of a study for which the models are not compared at any load."""
     status = errors["status"].values.ravel()
     causes = np.select([status == NOT_IN_DESIGN, status != COMPLETE], [NOT_REQUESTED, NOT_COMPARED], "")
     return find_left_out("pairs of runs", causes)

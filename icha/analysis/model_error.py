@@ -1,27 +1,26 @@
 """Compute errors of the asperity model with respect to boundary elements on the same topography at the same load.
 
-In the limit of a short range of attraction, the reference is a run of the same study with boundary elements. At finite
-ranges of attraction, the reference is a solution of the code Tamaas.
+The reference of a run is the run of the same study with boundary elements.
 """
 
 import contextlib
 import itertools
 from collections.abc import Iterable, Mapping
-from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 from scipy.stats import wasserstein_distance
 
+from icha.contact.attraction import FINITE_RANGE
 from icha.contact.model import GAP_BINS, PRESSURE_BINS
-from icha.contact.models import DEFAULT_MODEL
+from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
 from icha.datasets.attributes import DERIVED, combine_attributes, why_no_result
 from icha.datasets.build import bin_values, describe_variables, make_variable
 from icha.datasets.campaign import find_snapshot, loading_stops, select_run, spots_of
-from icha.datasets.labels import LABELS, RunLabels, SolutionLabels, arrange_slopes, labels_at, place_of, slope_dims
+from icha.datasets.labels import LABELS, RunLabels, arrange_slopes, labels_at, place_of, slope_dims
 from icha.datasets.variables.campaign import COMPLETE, INCOMPLETE, NOT_IN_DESIGN, RAGGED, STATUS
-from icha.datasets.variables.model_error import ASKED, BINS, FINITE_RANGE, MODEL_ERROR, SHORT_RANGE
-from icha.datasets.variables.run import CELLS
+from icha.datasets.variables.model_error import ASKED, BINS, MODEL_ERROR
 from icha.datasets.variables.terms import MATERIAL, Variable
 from icha.equilibrium.distributions import cover_grid
 from icha.path.targets import REDUCED_PRESSURE
@@ -33,6 +32,17 @@ _SUMMARY = "Results of the model and of boundary elements for the same topograph
 # Labels of the runs except the model.
 _LABELS = tuple(label for label in LABELS if label != "model")
 AXES = (*_LABELS, "reduced_pressure")
+
+
+class ComparedState(NamedTuple):
+    """Labels of a state that is compared: a run without its study and model, and the target of the load."""
+
+    surface: str
+    seed: int
+    rms_slope: float
+    material: str
+    reduced_pressure: float
+
 
 # Variables that must be equal in a run and its reference, up to the relative difference `_ROUNDING`.
 SHARED = ("period", "rms_height", "rms_curvature", "contact_modulus", "surface_energy", "interaction_range")
@@ -54,116 +64,61 @@ SUMMARISED = (
 
 
 def model_error(
-    campaign: xr.DataTree,
-    solutions: Iterable[tuple[SolutionLabels | tuple, xr.Dataset]] = (),
-    *,
-    runs: Iterable[tuple[RunLabels | tuple, xr.Dataset]] = (),
-    attrs: Mapping[str, str] = {},
+    campaign: xr.DataTree, runs: Iterable[tuple[RunLabels | tuple, xr.Dataset]], *, attrs: Mapping[str, str] = {}
 ) -> xr.DataTree:
     """Compare the runs of the asperity model with boundary elements at each load.
 
     Parameters
     ----------
-    campaign : the campaign dataset; asperity runs must have a `reduced_pressure` snapshot at the load of each solution.
-    solutions : labels and dataset of each solution at a finite range of attraction (`icha.references.finite_range`).
-    runs : labels and dataset of each run with boundary elements in the limit of a short range, with contact maps. Areas
-        and separations are compared at the targets of kind `reduced_pressure` of the first loading. Distributions and
-        contact maps are compared where both models have a snapshot.
+    campaign : the campaign dataset.
+    runs : labels and dataset of each run with boundary elements, with contact maps. Areas and separations are compared
+        at the targets of kind `reduced_pressure` of the first loading. Distributions and contact maps are compared
+        where both models have a snapshot.
     attrs : further global attributes.
 
     Returns
     -------
-    DataTree with one group for every study in `runs` and one group for every entry in `solutions`. The attribute
-    `truth` of a group names the reference (`SHORT_RANGE` or `FINITE_RANGE`). Dimensions are surface, seed, rms_slope,
-    material and the target of the reduced pressure. A group has
+    DataTree with one group for every study in `runs`. Dimensions are surface, seed, rms_slope, material and the target
+    of the reduced pressure. A group has
 
     - the variables of `icha.datasets.variables.model_error`;
     - for each name in `SUMMARISED`, the mean `<name>_mean` over the seeds; with two seeds or more, also the standard
       deviation `<name>_deviation`;
     - modulus, surface energy, range of attraction and Tabor parameter of the runs;
+    - `attraction(surface, seed, rms_slope, material)`, the law of attraction of the boundary elements;
     - `status(surface, seed, rms_slope, material)`, which is complete if both a run and its reference are complete.
       Otherwise the values are missing.
 
     Raises
     ------
     ValueError
-        If a solution has no asperity run, if this run has no snapshot at the load, or if run and reference differ in
-        topography or material. The message names entry, run and load.
+        If a run with boundary elements has no asperity run, or if both differ in topography or material. The message
+        names the run.
     """
     origins: dict[str, list[dict[str, str]]] = {}
-    select = cache(lambda labels: select_run(campaign, labels))
-    short_range = _short_range_entries(select, runs, origins)
-    finite_range = _finite_range_entries(select, solutions, origins)
-    groups = {}
-    for truth, word, entries in ((SHORT_RANGE, "study", short_range), (FINITE_RANGE, "entry", finite_range)):
-        for entry, states in entries.items():
-            title = f"{_TITLE}, {word} {entry}"
-            attributes = combine_attributes(title, _SUMMARY, DERIVED, origins.get(entry, [])) | {"truth": truth}
-            groups[f"/{entry}"] = _entry_dataset(campaign, entry, states).assign_attrs(attributes)
-    root = combine_attributes(_TITLE, _SUMMARY, DERIVED, itertools.chain(*origins.values()))
-    return xr.DataTree.from_dict({"/": xr.Dataset(attrs=root | dict(attrs))} | groups)
-
-
-def _short_range_entries(select, runs, origins):
-    """Compare the boundary elements in `runs` with the asperity runs of their studies; add attributes to `origins`."""
-    entries: dict[str, dict[SolutionLabels, dict | None]] = {}
+    studies: dict[str, dict[ComparedState, dict | None]] = {}
     for labels, truth in runs:
         labels = RunLabels(*labels)
-        run = select(labels._replace(model=DEFAULT_MODEL))
+        run = select_run(campaign, labels._replace(model=DEFAULT_MODEL))
         try:
-            entries.setdefault(labels.study, {}).update(_compare_stops(labels, run, truth))
+            studies.setdefault(labels.study, {}).update(_compare_stops(labels, run, truth))
         except ValueError as error:
             raise ValueError(f"{labels}: {error}") from None
         origins.setdefault(labels.study, []).extend((run.attrs, truth.attrs))
-    for states in entries.values():
+    groups = {}
+    for name, states in studies.items():
+        if not states:
+            continue
         # If a run has no state at a load of other runs of the study, its state at this load is None.
-        loads = {labels.reduced_pressure for labels in states}
-        for place in [labels._replace(reduced_pressure=load) for labels in states for load in loads]:
-            states.setdefault(place, None)
-    return {study: states for study, states in entries.items() if states}
-
-
-def _finite_range_entries(select, solutions, origins):
-    """Compare asperity runs of entries with `solutions` at finite ranges; collect attributes in `origins`."""
-    entries: dict[str, dict[SolutionLabels, dict | None]] = {}
-    for labels, solution in solutions:
-        labels = SolutionLabels(*labels)
-        states = entries.setdefault(labels.entry, {})
-        try:
-            run = select(labels.run)
-            if why_no_result(run.attrs):
-                states[labels] = None
-                continue
-            state = REDUCED_PRESSURE, labels.reduced_pressure
-            if "beyond_model" in run.attrs and snapshot_if_any(run, *state) is None:
-                states[labels] = None
-                continue
-            snapshot = find_snapshot(run, *state)
-            target = float(solution["target_reduced_pressure"])
-            if not np.isclose(target, labels.reduced_pressure, rtol=1e-9):
-                raise ValueError(
-                    f"the solution is for reduced pressure {target:g}; expected {labels.reduced_pressure:g}"
-                )
-            states[labels] = compare_state(run, snapshot, solution)
-        except ValueError as error:
-            name = f"entry {labels.entry}, run {labels.run}, reduced pressure {labels.reduced_pressure:g}"
-            raise ValueError(f"{name}: {error}") from None
-        origins.setdefault(labels.entry, []).extend((run.attrs, solution.attrs))
-    return entries
-
-
-def compare_state(run: xr.Dataset, snapshot: int, solution: xr.Dataset) -> dict[str, float | np.ndarray]:
-    """Return the variables of `MODEL_ERROR` for one snapshot of an asperity run and the solution at the same load.
-
-    Raises
-    ------
-    ValueError
-        If run and solution differ in topography or material, or if the contact area or the mean separation of the
-        solution is not positive.
-    """
-    if difference := difference_of_contacts(run, solution):
-        raise ValueError(difference)
-    return _amounts(state_of(run, snapshot), solution) | _shapes(run, snapshot, solution)
+        loads = {state.reduced_pressure for state in states}
+        for state in [state._replace(reduced_pressure=load) for state in states for load in loads]:
+            states.setdefault(state, None)
+        attributes = combine_attributes(f"{_TITLE}, study {name}", _SUMMARY, DERIVED, origins[name])
+        groups[f"/{name}"] = _study_dataset(campaign[name].to_dataset(), states).assign_attrs(
+            attributes | {"study": name}
+        )
+    root = combine_attributes(_TITLE, _SUMMARY, DERIVED, itertools.chain(*origins.values()))
+    return xr.DataTree.from_dict({"/": xr.Dataset(attrs=root | dict(attrs))} | groups)
 
 
 def _compare_stops(labels, run, truth):
@@ -179,11 +134,11 @@ def _compare_stops(labels, run, truth):
         # In full contact the mean separation is zero, and without contact the area: relative errors are undefined.
         positive = in_both and all(truth[name].values[true_stops[load]] > 0 for name in _POSITIVE)
         if positive:
-            solution = _as_solution(truth, true_stops[load], load)
-            state = _amounts(run.isel(step=stops[load]), solution)
-            if "contact" in solution and (snapshot := snapshot_if_any(run, REDUCED_PRESSURE, load)) is not None:
-                state |= _shapes(run, snapshot, solution)
-        found[SolutionLabels(labels.study, labels.study, *labels[2:], load)] = state
+            state = _amounts(run.isel(step=stops[load]), truth.isel(step=true_stops[load]), load)
+            snapshots = [snapshot_if_any(each, REDUCED_PRESSURE, load) for each in (run, truth)]
+            if None not in snapshots:
+                state |= _shapes(run, truth, *snapshots)
+        found[ComparedState(*labels[2:], load)] = state
     return found
 
 
@@ -201,81 +156,58 @@ def snapshot_if_any(run: xr.Dataset, kind: str, target: float) -> int | None:
         return None
 
 
-def _as_solution(run, step, load):
-    """Convert a step of a boundary-element run to the variables of a solution at a finite range.
-
-    If the step has a snapshot, the distributions and the contact map are included. In the limit of a short range, no
-    stress acts outside contact, so all definitions of the contact area give the same value.
-    """
-    state = run.drop_dims([*RAGGED, "snapshot"], errors="ignore").isel(step=step)
-    snapshot = snapshot_if_any(run, REDUCED_PRESSURE, load)
-    if snapshot is not None:
-        contact = run["contact_map"].isel(snapshot=snapshot).transpose("row", "column").values >= _HALF
-        state = state_of(run, snapshot).drop_dims(CELLS).assign(contact=(("y", "x"), contact))
-    area = state["contact_area_fraction"]
-    return state.assign(
-        contact_area_fraction_raw=area,
-        energetic_area_fraction=area,
-        residual=state["front_residual"],
-        load_error=state["reduced_pressure"] / load - 1,
-    )
-
-
-def _amounts(state, solution):
-    """Return areas, separations and errors of a state, with residual and grid of the boundary-element solution."""
-    area, truth = (float(each["contact_area_fraction"]) for each in (state, solution))
-    separation, true_separation = (float(each["reduced_separation"]) for each in (state, solution))
-    for name, value in (("contact area", truth), ("mean separation", true_separation)):
-        if not value > 0:
-            raise ValueError(f"the {name} of boundary elements is {value:g}; expected a positive value")
-    # At a finite range, attraction also acts outside the area of zero gap. As the range decreases, both the energetic
-    # area and the area of zero gap approach the area of JKR theory. The energetic area is closer to this limit.
-    adhesive = float(solution["surface_energy"]) > 0
-    raw, energetic = float(solution["contact_area_fraction_raw"]), float(solution["energetic_area_fraction"])
+def _amounts(state, truth, load):
+    """Return areas, separations and errors of a state, with residual and grid of the state with boundary elements."""
+    area, true_area = (float(each["contact_area_fraction"]) for each in (state, truth))
+    separation, true_separation = (float(each["reduced_separation"]) for each in (state, truth))
+    # At a short range, attraction acts only in contact, so both areas are equal. At a finite range, attraction also
+    # acts outside the area of zero gap. As the range decreases, both areas approach the area of JKR theory. The
+    # energetic area is closer to this limit.
+    finite = truth.attrs.get("attraction") == FINITE_RANGE
+    energetic = float(truth["energetic_area_fraction"]) if finite else true_area
     return {
         "contact_area_fraction": area,
-        "contact_area_fraction_boundary_elements": truth,
-        "contact_area_fraction_raw": raw,
-        "perimeter_correction": raw / truth - 1,
+        "contact_area_fraction_boundary_elements": true_area,
         "energetic_area_fraction": energetic,
         "reduced_separation": separation,
         "reduced_separation_boundary_elements": true_separation,
-        "area_error": area / truth - 1,
-        "energetic_area_error": area / (energetic if adhesive else truth) - 1,
+        "area_error": area / true_area - 1,
+        "energetic_area_error": area / energetic - 1,
         "separation_error": separation / true_separation - 1,
-        "load_error": float(solution["load_error"]),
-        "residual": float(solution["residual"]),
-        "solution_grid": int(solution["grid"]),
+        "load_error": float(truth["reduced_pressure"]) / load - 1,
+        "residual": float(truth["front_residual"]),
+        "solution_grid": int(truth["grid"]),
     }
 
 
-def _shapes(run, snapshot, solution):
-    """Return differences of distributions and contact maps between models, and the densities of the solution."""
-    state, spots = state_of(run, snapshot), contact_of_spots(run, snapshot, solution.sizes["x"])
-    contact = solution["contact"].transpose("y", "x").values == 1
-    height, nominal = float(solution["rms_height"]), float(state["nominal_pressure"])
-    pressure = float(solution["contact_modulus"]) * float(solution["rms_slope"])
-    gaps = solution["gap_density"].values * height
-    # The last bin of the solution contains all larger gaps, so it may be wider than the last bin of `GAP_BINS`.
-    gaps[-1] *= np.diff(solution["gap_bin_edges"].values)[-1] / np.diff(GAP_BINS * height)[-1]
+def _shapes(run, truth, snapshot, true_snapshot):
+    """Return differences of distributions and contact maps between models, and the densities of boundary elements."""
+    state, true_state = state_of(run, snapshot), state_of(truth, true_snapshot)
+    contact = true_state["contact_map"].transpose("row", "column").values >= _HALF
+    spots = contact_of_spots(run, snapshot, len(contact))
+    height, nominal = float(truth["rms_height"]), float(state["nominal_pressure"])
+    pressure = float(truth["contact_modulus"]) * float(truth["rms_slope"])
+    gaps = true_state["gap_density"].values * height
+    # The last bin of boundary elements contains all larger gaps, so it may be wider than the last bin of `GAP_BINS`.
+    gaps[-1] *= np.diff(true_state["gap_bin_edges"].values)[-1] / np.diff(GAP_BINS * height)[-1]
     return {
-        "gap_distribution_distance": distribution_distance("gap", state, solution) / height,
-        "pressure_distribution_distance": distribution_distance("pressure", state, solution) / nominal,
+        "gap_distribution_distance": distribution_distance("gap", state, true_state) / height,
+        "pressure_distribution_distance": distribution_distance("pressure", state, true_state) / nominal,
         "jaccard": jaccard(spots, contact),
         "shared_of_icha": shared(spots, contact),
         "shared_of_boundary_elements": shared(contact, spots),
         "gap_density": gaps,
-        "pressure_density": solution["pressure_density"].values * pressure,
+        "pressure_density": true_state["pressure_density"].values * pressure,
     }
 
 
-def difference_of_contacts(run: xr.Dataset, solution: xr.Dataset) -> str:
-    """Describe the first difference in topography or material between a run and a solution; "" if there is none."""
+def difference_of_contacts(run: xr.Dataset, other: xr.Dataset) -> str:
+    """Describe the first difference in topography or material between two runs; "" if there is none."""
     for name in (*SHARED, "seed"):
-        value, expected = float(run[name]), float(solution[name])
+        value, expected = float(run[name]), float(other[name])
         if not np.isclose(value, expected, rtol=_ROUNDING, atol=0):
             units = run[name].attrs.get("units", "1")
-            return f"{name} is {value:.7g} for the run, {expected:.7g} for the solution (in {units})"
+            return f"{name} is {value:.7g} for the run, {expected:.7g} for the other run (in {units})"
     return ""
 
 
@@ -329,10 +261,8 @@ def _values_and_weights(quantity, state):
     return np.concatenate([[0.0], values]), np.concatenate([[rest], content])
 
 
-def _entry_dataset(campaign, entry, states):
-    """Arrange the compared states of one entry as a dataset along `AXES`; a missing state is None."""
-    name = next(labels.study for labels in states)
-    study = campaign[name].to_dataset()
+def _study_dataset(study, states):
+    """Arrange the compared states of a study as a dataset along `AXES`; a missing state is None."""
     axes = _axes(study, states)
     slopes = axes["rms_slope"]
     coords = {
@@ -346,37 +276,38 @@ def _entry_dataset(campaign, entry, states):
     coords["reduced_pressure"] = make_variable(ASKED, axes["reduced_pressure"])
     labelled = xr.Dataset(coords=coords)
     shape = tuple(labelled.sizes[axis] for axis in AXES)
-    grid = [SolutionLabels(entry, name, *labels_at(labelled, place, AXES)) for place in np.ndindex(shape)]
+    grid = [ComparedState(*labels_at(labelled, place, AXES)) for place in np.ndindex(shape)]
     # The comparison of a run is complete if states were compared at one load or more.
     statuses = [
         NOT_IN_DESIGN if labels not in states else INCOMPLETE if states[labels] is None else COMPLETE for labels in grid
     ]
     variables = {"status": make_variable(STATUS._replace(dims=_LABELS), np.reshape(statuses, shape).min(axis=-1))}
     variables |= _arrange(shape, [states.get(labels) for labels in grid])
-    applicability = _of_asperities(study["applicability"], labelled)
+    applicability = _of_model(DEFAULT_MODEL, study["applicability"], labelled)
     variables |= _summarise_over_seeds(variables, applicability.values[..., None] == "")
     bins = describe_variables(BINS, bin_values("gap", GAP_BINS) | bin_values("pressure", PRESSURE_BINS))
     coords |= {name: bins.pop(name) for name in BINS if BINS[name].coordinate}
-    result = xr.Dataset(variables | bins, coords, {"entry": entry, "study": name})
+    result = xr.Dataset(variables | bins, coords)
     for quantity in MATERIAL:
         result[quantity] = study[quantity].sel(material=axes["material"])
-    result["tabor_parameter"] = _of_asperities(study["tabor_parameter"], labelled)
+    result["tabor_parameter"] = _of_model(DEFAULT_MODEL, study["tabor_parameter"], labelled)
+    result["attraction"] = _of_model(REFERENCE_MODEL, study["attraction"], labelled)
     return result.assign(applicability=applicability)
 
 
-def _of_asperities(quantity, labelled):
-    """Return a quantity of the asperity runs along the labels of the dataset `labelled`; NaN for missing runs."""
+def _of_model(model, quantity, labelled):
+    """Return a quantity of the runs of a model along the labels of `labelled`; NaN or "" for missing runs."""
     none = "" if quantity.dtype.kind in "OSU" else np.nan
     values = np.full([labelled.sizes[label] for label in _LABELS], none, object if none == "" else float)
     for place in np.ndindex(values.shape):
         labels = dict(zip(_LABELS, labels_at(labelled, place, _LABELS), strict=True))
         with contextlib.suppress(KeyError):
-            values[place] = quantity.isel(place_of(quantity.to_dataset(), {"model": DEFAULT_MODEL} | labels)).item()
+            values[place] = quantity.isel(place_of(quantity.to_dataset(), {"model": model} | labels)).item()
     return xr.Variable(_LABELS, values, quantity.attrs)
 
 
 def _axes(study, states):
-    """Return the values along each of `AXES` in the states of an entry; `arrange_slopes` gives the rms slopes."""
+    """Return the values along each of `AXES` in compared states; `arrange_slopes` gives the rms slopes."""
     asked = {axis: {getattr(labels, axis) for labels in states} for axis in AXES}
     axes = {
         label: [value for value in study[label].values.tolist() if value in asked[label]]

@@ -161,7 +161,7 @@ def statements(
     if sticky:
         text = f"attraction outweighs repulsion: {join_first(sticky)}; errors can be many times those of the validation"
         found.append(Statement("sticky", text, False))
-    found += [*_resolution(cases), *_short_range(cases)]
+    found += [*_resolution(cases), *_attraction(cases)]
     if loops:
         found.append(Statement("loops", describe_loops(loops), is_resolved(loops)))
     of_asperities = [case for case in cases if MODELS[case.model].by_summits]
@@ -228,17 +228,25 @@ def _resolution(cases):
         yield Statement("grid", text, False)
 
 
-def _short_range(cases):
-    """Yield the statement on boundary elements whose attraction has a longer range than they assume."""
+def _attraction(cases):
+    """Yield the statements on boundary elements at a finite range, and in the limit of a short range if it is long."""
     lowest: dict[str, float] = {}
-    for case in cases:
-        value = case.facts.get(TABOR, math.inf)
-        if MODELS[case.model].by_cells and value < SHORT_RANGE_FROM:
-            name = f"{case.material} on {case.surface}"
+    finite: dict[str, None] = {}
+    for case in (case for case in cases if MODELS[case.model].by_cells):
+        value, name = case.facts.get(TABOR, math.inf), f"{case.material} on {case.surface}"
+        if 0 < case.facts.get(STRENGTH, 0.0) <= case.facts.get(RESOLVED, 0.0):
+            finite[name] = None
+        elif value < SHORT_RANGE_FROM:
             lowest[name] = min(value, lowest.get(name, math.inf))
+    if finite:
+        others = "; other boundary elements are in the limit of a short range"
+        yield Statement("finite range", f"the grid resolves the range of attraction of {join_first(finite)}{others}")
     if lowest:
         text = join_first((f"{name}: {describe_short_range(value)}" for name, value in lowest.items()), ". ")
-        text = f"boundary elements assume Tabor parameters of {SHORT_RANGE_FROM:g} and more; {text}"
+        assumed = (
+            "where the grid does not resolve the range of attraction, boundary elements assume Tabor parameters of "
+        )
+        text = f"{assumed}{SHORT_RANGE_FROM:g} and more; {text}"
         yield Statement("short range", text, False)
 
 

@@ -1,4 +1,4 @@
-"""Contact model by boundary elements with short-ranged adhesion, for loading and unloading paths."""
+"""Contact model by boundary elements with adhesion of a short or finite range, for loading and unloading paths."""
 
 from __future__ import annotations
 
@@ -9,16 +9,19 @@ from functools import cached_property
 from importlib.metadata import version
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
-from icha.boundary_elements.adhesive import Summits, solve_adhesive_contact
-from icha.boundary_elements.elastic_contact import Contact, Topography, solve_nonadhesive_contact
-from icha.boundary_elements.front import Front, adhesive_areas, reported_area_gradient, reported_areas
-from icha.boundary_elements.front_solver import TOLERANCES, FrontProblem, find_active_cells, rates_with_separation
+from icha.boundary_elements import minimise as solver
+from icha.boundary_elements.elastic import HalfSpace
 from icha.boundary_elements.full_contact import ROUNDING, FullContactProblem
-from icha.boundary_elements.half_space import MARGIN, HalfSpace, Layer
-from icha.boundary_elements.load_control import ControlProblem, solve_at_control
+from icha.boundary_elements.laws import (
+    Cohesive,
+    NoAttraction,
+    ShortRange,
+    average,
+)
 from icha.boundary_elements.observables import PatchObservables
 from icha.boundary_elements.patches import (
     BEYOND_EDGES,
@@ -29,16 +32,31 @@ from icha.boundary_elements.patches import (
     patch_events,
     unpack,
 )
+from icha.contact.attraction import FINITE_RANGE, SHORT_RANGE, attraction_on
 from icha.contact.checkpoints import CheckpointedContact
 from icha.contact.model import AREA_FRACTION, PRESSURE, Control, NotConverged
-from icha.contact.models import MODELS, REFERENCE_MODEL, PathAccuracy
+from icha.contact.models import AREA_TOLERANCE_CELLS, AREA_TOLERANCE_PART, MODELS, REFERENCE_MODEL, PathAccuracy
+from icha.half_space.layer import Layer
 from icha.surfaces.summits import locate_summits
 from icha.surfaces.surface import Surface
 
 # Smallest critical opening divided by the largest height. Rounding of the heights would hide a smaller opening.
 _SMALLEST_OPENING = 1e-4
-# The rates of a state predict the next state if no fraction of contact changes by more than this.
+# Largest change of a position, in cell sizes, by which the rates of a state predict the next state.
 _LARGEST_PREDICTION = 1.0
+# Largest opening of a bond in a prediction, over the range of attraction.
+_KEPT_BONDS = 0.5
+# A load or area is met if its relative error is at most this part of the error that paths allow. Most trials for it.
+_MET, _MOST_TRIALS = 0.5, 60
+# Longest step of a search without a bracket, and smallest difference of two separations, in h_rms. Least load to which
+# errors at zero load are relative, in units of stiffness times h_rms.
+_LONGEST, _SAME_SEPARATION, _ZERO_LOAD = 0.1, 1e-13, 1e-2
+# Largest displacement by residual pressures, in h_rms.
+_GAP_ERROR = 5e-9
+# Distance of untouched surfaces over the range of attraction: a little more, so that rounding leaves no attraction.
+_BEYOND_REACH = 1 + 1e-6
+# Largest relative error of the rates of a state.
+_RATE_ERROR = MODELS[REFERENCE_MODEL].stiffness_error
 # Least energy to which errors of the work in a loop are relative, in units of `surface_energy` times A0.
 _SMALLEST_WORK = 1e-3
 
@@ -46,6 +64,11 @@ _SMALLEST_WORK = 1e-3
 @dataclass(frozen=True, eq=False)
 class BoundaryElements(FullContactProblem):
     """Contact model of a rough surface against a half-space or layer, by boundary elements on grid cells."""
+
+    @cached_property
+    def cell_heights(self) -> np.ndarray:
+        """Heights in cell sizes, (n, n)."""
+        return self.heights / self.spacing
 
     @property
     def count(self) -> int:
@@ -63,9 +86,19 @@ class BoundaryElements(FullContactProblem):
         return 1.0
 
     @property
+    def is_unique(self) -> bool:
+        """Whether each load has only one equilibrium: without adhesion."""
+        return not self.adhesive
+
+    @property
     def area_step(self) -> float:
-        """Area of a cell without adhesion, because whole cells touch; 0 with adhesion, because fronts divide cells."""
-        return 0.0 if self.adhesive else 1 / self.count
+        """Area of a cell if whole cells touch; 0 at a short range of attraction, because fronts divide cells."""
+        return 0.0 if self.divides_cells else 1 / self.count
+
+    @property
+    def divides_cells(self) -> bool:
+        """Whether a part of a cell may be in contact: only at a short range of attraction."""
+        return self.attraction.name == SHORT_RANGE
 
     @cached_property
     def path_accuracy(self) -> PathAccuracy:
@@ -74,11 +107,13 @@ class BoundaryElements(FullContactProblem):
         return replace(MODELS[REFERENCE_MODEL].accuracy, least_work=least_work, error_controlled_steps=self.adhesive)
 
     def untouched(self) -> CellState:
-        """Return the state without contact where the first summit jumps into contact, or the highest point touches."""
+        """Return the state without contact where a first summit jumps into contact, or a point touches or attracts."""
         separation = float(self.heights.max())
-        if self.adhesive:
-            first = self.asperities.height + self.summits.reach * self.spacing
+        if isinstance(self.attraction, ShortRange):
+            first = self.asperities.height + self.attraction.jump_in * self.spacing
             separation = float(np.max(first, initial=separation))
+        else:
+            separation += self.attraction.reach * self.spacing * _BEYOND_REACH
         nothing = np.zeros(0)
         return CellState(separation, nothing.astype(int), nothing, nothing, nothing)
 
@@ -103,17 +138,57 @@ class BoundaryElements(FullContactProblem):
         return replace(state, history=(*before.history, events) if len(events) else before.history)
 
     def _next_equilibrium(self, state, separation, control):
-        """Find the equilibrium from a state with gaps. Areas, loads with adhesion and a first contact need a search."""
+        """Find the equilibrium from a state with gaps. Areas, tensile loads and a first contact need a search."""
         if control is None:
             closed = separation < self.smallest_gap
             return self.full_contact(self.undetermined_pressure) if closed else self._solve(state, separation)
-        if not self.adhesive and control.quantity == PRESSURE and control.target > 0 and len(state.cells):
-            if control.target >= self.opening_pressure:
-                return self.full_contact(control.target)
-            return self._solve_nonadhesive(
-                state, load=control.target / self.contact_modulus * self.count / self.space.size
-            )
-        return solve_at_control(ControlProblem(self, control, self._solve, self._events), state, separation)
+        if control.quantity != PRESSURE or control.target <= 0 or (self.adhesive and not len(state.cells)):
+            return self._search(state, separation, control)
+        if control.target >= self.opening_pressure and not self.adhesive:
+            return self.full_contact(control.target)
+        return self._solve(state, separation, control.target)
+
+    def _search(self, state, separation, control):
+        """Find the equilibrium with a load or area by secants and halvings of the separation."""
+        value = self.pressure if control.quantity == PRESSURE else self.area_fraction
+        target, tolerance = control.target, self._tolerance(state, control)
+        sign = np.sign(target - value(state)) or 1.0
+        before, beyond, trial = state, None, state
+        for _ in range(_MOST_TRIALS):
+            ends = [before.separation, beyond.separation] if beyond else [-np.inf, np.inf]
+            if not min(ends) < separation < max(ends):
+                separation = 0.5 * sum(ends) if beyond else self._closer(before.separation, sign)
+            if separation < self.smallest_gap:
+                raise NotConverged(f"the mean gap vanishes before a {control.quantity.replace('_', ' ')} of {target:g}")
+            trial = self._solve(before, separation)
+            error = value(trial) - target
+            if abs(error) <= tolerance:
+                return trial
+            if sign * error < 0:
+                before = trial
+            else:
+                beyond = trial
+            slope = self.slope(control.quantity, trial)
+            separation = trial.separation - error / slope if slope < 0 else np.nan
+            if beyond and abs(before.separation - beyond.separation) < _SAME_SEPARATION * self.rms_height:
+                break
+        raise NotConverged(f"found no equilibrium at a {control.quantity.replace('_', ' ')} of {target:g}")
+
+    def _closer(self, separation, sign):
+        """Return a separation nearer to the target than all states so far, m; `sign` is that of the missing load."""
+        longest = _LONGEST * self.rms_height
+        return separation - sign * (min(0.5 * separation, longest) if not self.space.free else longest)
+
+    def _tolerance(self, state, control):
+        """Return the largest error of a met target: relative; for areas without adhesion, some cell areas."""
+        scale = abs(control.target)
+        if not scale:
+            unit = abs(self.stiffness(state)) * self.rms_height
+            scale = max(abs(self.pressure(state)), _ZERO_LOAD * unit if np.isfinite(unit) else 0.0)
+        met = _MET * self.path_accuracy.target * scale
+        if control.quantity == AREA_FRACTION and self.area_step:
+            return max(met, min(AREA_TOLERANCE_CELLS * self.area_step, AREA_TOLERANCE_PART * scale))
+        return met
 
     def _from_full_contact(self, state, separation, control):
         """Find the next equilibrium from full contact. It opens below its opening pressure; see `equilibrium`."""
@@ -132,14 +207,15 @@ class BoundaryElements(FullContactProblem):
         """Return whether each cell in contact, (k,), is in an outermost row or column of a free square."""
         row, column = np.divmod(state.cells, len(self.heights))
         outermost = (np.minimum(row, column) == 0) | (np.maximum(row, column) == self.grid - 1)
-        return outermost & bool(self.space.transformed)
+        return outermost & self.space.free
 
     def reason_beyond(self, state: CellState) -> str:
-        """Return a reason if the contact of a shape has reached the edge of its square; otherwise an empty text."""
+        """Return a reason if contact or attraction of a shape has reached the edge of its square; otherwise ""."""
         if self.shape is None or not self.at_edge(state).any():
             return ""
+        reaching = "attraction" if self.attraction.name == FINITE_RANGE else "contact"
         return (
-            f"the contact reaches the edge of the square of side {self.grid * self.spacing:g} m, although the shape "
+            f"the {reaching} reaches the edge of the square of side {self.grid * self.spacing:g} m, although the shape "
             "continues; use a larger square, or smaller loads"
         )
 
@@ -164,11 +240,34 @@ class BoundaryElements(FullContactProblem):
     def area_of_cells(self, state: CellState) -> np.ndarray:
         """Return the contact area of each cell, (k,), divided by the cell area.
 
-        With adhesion these are `reported_areas`; without, 1 minus BEYOND_EDGES for each free edge of the cell.
+        At a short range of attraction these are `reported_areas`. Otherwise only cells without a gap are in contact,
+        and their area is 1 minus BEYOND_EDGES for each free edge.
         """
-        if self.adhesive:
-            return reported_areas(state.fraction, state.mean_fraction)
-        return 1 - BEYOND_EDGES * free_edges(state.cells, self.space.grid)
+        if self.divides_cells:
+            return ShortRange.reported_areas(state.fraction, state.mean_fraction)
+        closed = state.fraction == 1
+        areas = np.zeros(len(state.cells))
+        areas[closed] = 1 - BEYOND_EDGES * free_edges(state.cells[closed], self.space.grid)
+        return areas
+
+    def in_contact(self, state: CellState) -> CellState:
+        """Return a state without the cells that attract across a gap of finite range."""
+        if self.divides_cells:
+            return state
+        closed = state.fraction == 1
+        parts = {name: getattr(state, name)[closed] for name in ("cells", "fraction", "pressure", "mean_fraction")}
+        return replace(state, rates=None, **parts)
+
+    def energetic_area_fraction(self, state: CellState) -> float:
+        """Return the energy of adhesion of a state divided by that of full contact.
+
+        At a finite range, this is the sum of f^2 over all cells. At a short range, it is the adhesive area.
+        """
+        if self.divides_cells:
+            areas = ShortRange.adhesive_areas(state.fraction, state.mean_fraction)
+        else:
+            areas = state.fraction**2
+        return float(np.sum(areas)) / self.count
 
     def gap(self, state: CellState) -> np.ndarray:
         """Return the gap at the grid nodes, (n, n), m; in partial cells it is the extension of the bond."""
@@ -176,7 +275,16 @@ class BoundaryElements(FullContactProblem):
 
     def displacement(self, state: CellState) -> np.ndarray:
         """Return the displacement of the elastic surface at the grid nodes, (n, n), m, away from the rough surface."""
-        return self.crop(self.space.displacement(state.cells, state.pressure / self.contact_modulus) * self.spacing)
+        displacement = self.space.displacement(self.field(state.cells, state.pressure / self.contact_modulus))
+        if not self.space.free:
+            displacement -= displacement.mean()
+        return self.crop(displacement) * self.spacing
+
+    def field(self, cells: np.ndarray, values: np.ndarray, dtype: DTypeLike = float) -> np.ndarray:
+        """Return a field of the grid with given values on cells (k,), and zero elsewhere."""
+        field: np.ndarray = np.zeros((self.space.grid,) * 2, dtype)
+        field.ravel()[cells] = values
+        return field
 
     def crop(self, field: np.ndarray) -> np.ndarray:
         """Return a field of the grid without the margin of a free square."""
@@ -184,18 +292,18 @@ class BoundaryElements(FullContactProblem):
 
     def fractions(self, state: CellState) -> np.ndarray:
         """Return the fraction of contact of all cells of the surface, (n, n)."""
-        return self.crop(self.space.field(state.cells, state.fraction))
+        return self.crop(self.field(state.cells, state.fraction))
 
     def mean_gap(self, state: CellState) -> float:
         """Return the mean gap where the surface has a height, m; it is the mean separation if that is fixed."""
-        if self.space.mean_is_fixed:
+        if not self.space.free:
             return state.separation
         gap = self.gap(state)
         return float(np.mean(gap[np.isfinite(gap)]))
 
     def spot_count(self, state: CellState) -> int:
         """Return the number of contact patches of a state."""
-        return label_patches(state.cells, self.space.grid)[1]
+        return label_patches(self.in_contact(state).cells, self.space.grid)[1]
 
     def stiffness(self, state: CellState) -> float:
         """Return the contact stiffness -dp/du with moving fronts, Pa/m; p nominal pressure, u mean separation."""
@@ -213,83 +321,109 @@ class BoundaryElements(FullContactProblem):
         """Return False: every equilibrium is a minimum of energy."""
         return False
 
-    def _predict(self, state, separation):
-        """Predict the contact at a separation (m) by the rates of a state; without valid rates, do not change it."""
-        contact = Contact(state.cells, state.fraction, state.pressure / self.contact_modulus)
-        if state.rates is None:
-            return contact
-        distance = (separation - state.separation) / self.spacing
-        change = state.rates[0] * distance
-        if not np.abs(change).max() <= _LARGEST_PREDICTION:  # or not finite
-            return contact
-        return contact.apply_step(change, state.rates[1] * distance)
+    def _start(self, state, separation):
+        """Return positions and fractions, (n, n), predicted at a separation (m) by the rates of a state.
 
-    def _solve(self, state, separation, residual=TOLERANCES.front, *, nearby=False, reuse_slopes=False):
-        """Solve the equilibrium at a separation (m), starting from the prediction of `_predict`.
-
-        The options have an effect only with adhesion. residual : largest residual of the front. nearby : whether the
-        start is near equilibrium. reuse_slopes : keep the slopes of `state` if the same cells are in contact.
+        If a long step would open bonds, cells in contact keep their positions.
         """
-        if not self.adhesive:
-            return self._solve_nonadhesive(state, separation=separation / self.spacing)
-        height = self.rms_height / self.spacing
-        problem = FrontProblem(self.space, self.front, self.topography, separation / self.spacing, rms_height=height)
-        start = self._predict(state, separation)
-        solved, pending = solve_adhesive_contact(problem, self.summits, start, residual, nearby=nearby)
-        front_residual = find_active_cells(self.front, solved).residual
-        new = self._state_of(solved, separation, solved.mean_fraction, front_residual=front_residual, pending=pending)
-        if reuse_slopes and np.array_equal(new.cells, state.cells):
-            return replace(new, pressure_slope=state.pressure_slope, area_slope=state.area_slope, rates=state.rates)
-        return self._with_slopes(new, float(np.clip(residual, *TOLERANCES.linear)))
+        pressure, distance = state.pressure / self.contact_modulus, (separation - state.separation) / self.spacing
+        fraction = self.field(state.cells, state.fraction if self.adhesive else 0.0)
+        before = self.space.displacement(self.field(state.cells, pressure))
+        change = np.zeros_like(before)
+        if state.rates is not None:
+            change = self.space.displacement(self.field(state.cells, state.rates * distance))
+            if np.abs(change).max() > _LARGEST_PREDICTION:
+                change[:] = 0.0
+        if not self.space.free:
+            before -= before.mean()
+            change -= change.mean()
+        change += distance
+        if self.adhesive and change.ravel()[state.cells].max(initial=0.0) > _KEPT_BONDS * self.attraction.reach:
+            change.ravel()[state.cells] = 0.0
+        return before + state.separation / self.spacing + change, fraction
 
-    def _solve_nonadhesive(self, state, **given):
-        """Solve the equilibrium without adhesion at a given separation (cell sizes) or load (nominal pressure, E*)."""
-        contact = Contact(state.cells, state.fraction, state.pressure / self.contact_modulus)
-        solved = solve_nonadhesive_contact(self.space, self.topography, contact, **given)
-        new = self._state_of(solved, solved.separation * self.spacing, np.zeros(len(solved.cells)))
-        return self._with_slopes(new, TOLERANCES.linear[0])
+    def _solve(self, state, separation, pressure=None):
+        """Solve the equilibrium at a separation (m), or at a nominal pressure (Pa) with a guess of the separation."""
+        unit = self.contact_modulus
+        if pressure is not None:
+            control = solver.Control(load=pressure / unit * self.count / self.heights.size)
+            separation = separation if separation > self.smallest_gap else 0.5 * state.separation
+        else:
+            control = solver.Control(**{"rigid" if self.space.free else "mean": separation / self.spacing})
+        position, fraction = self._start(state, separation)
+        found = solver.minimise(
+            self.space,
+            self.attraction,
+            self.cell_heights,
+            position,
+            fraction,
+            control,
+            _GAP_ERROR * self.rms_height / self.spacing,
+        )
+        return self._state_of(found)
 
-    def _state_of(self, found, separation, mean_fraction, **values):
-        """Return the state of a solved contact at a separation (m), with its gap residual and further `values`."""
-        pressure, closed = found.pressure * self.contact_modulus, found.cells[found.fraction >= 1]
-        # Largest gap of a closed cell, or largest overlap of the surfaces if that is larger.
-        error = float(max(np.abs(found.gap.ravel()[closed]).max(initial=0.0), -found.gap.min())) * self.spacing
-        return CellState(separation, found.cells, found.fraction, pressure, mean_fraction, gap_residual=error, **values)
+    def _state_of(self, found):
+        """Return the state of a solved contact, with its rates and slopes."""
+        if found.held.all():
+            return self.full_contact(found.load * self.contact_modulus)
+        touching = found.fraction > 0 if self.adhesive else found.held
+        cells = np.flatnonzero(touching)
+        mean = found.position.mean() - self.space.mean_compliance * found.load
+        fraction = found.fraction.ravel()[cells] if self.adhesive else np.ones(len(cells))
+        neighbours = average(found.fraction).ravel()[cells] if self.adhesive else np.zeros(len(cells))
+        pressure = found.pressure.ravel()[cells] * self.contact_modulus
+        state = CellState(
+            mean * self.spacing,
+            cells,
+            fraction,
+            pressure,
+            neighbours,
+            residual=found.residual,
+            gap_residual=found.gap_residual * self.spacing,
+            pending=found.pending,
+        )
+        if not len(cells):
+            return state
+        found_rates = solver.rates(self.space, self.attraction, self.cell_heights, found, _RATE_ERROR)
+        rates, fraction_rates = (each.ravel()[cells] for each in found_rates[1:])
+        scale = self.count * self.spacing
+        pressure_slope = float(np.sum(rates)) * self.contact_modulus / scale
+        if self.divides_cells:
+            area_slope = float(np.sum(ShortRange.reported_area_gradient(fraction, neighbours) * fraction_rates)) / scale
+        elif self.adhesive:
+            # The area changes by whole cells. On average it changes nearly as the energetic area.
+            area_slope = float(np.sum(2 * fraction * fraction_rates)) / scale
+        else:
+            # The area changes by whole cells, but on average it is nearly proportional to the load.
+            area_slope = self.area_fraction(state) * pressure_slope / (self.pressure(state) or np.inf)
+        return replace(state, pressure_slope=pressure_slope, area_slope=area_slope, rates=rates)
 
     def _events(self, before, after):
         """Find jumps, coalescences and splits between two states; without adhesion they release no energy."""
         energy = (
             self._energy_of_lone_cells if self.adhesive else lambda state, chosen: np.zeros(np.count_nonzero(chosen))
         )
-        return patch_events(before, after, energy, self.summits.cell, self.space.grid, self.spacing)
-
-    def _with_slopes(self, state, accuracy):
-        """Return the state with rates and slopes to a relative accuracy; without adhesion, estimate the area slope."""
-        if not len(state.cells):
-            return state
-        contact = Contact(state.cells, state.fraction, state.pressure / self.contact_modulus)
-        fraction, pressure = rates_with_separation(self.space, self.front, contact, state.mean_fraction, accuracy)
-        scale = self.count * self.spacing
-        pressure_slope = float(np.sum(pressure)) * self.contact_modulus / scale
-        if self.adhesive:
-            gradient = reported_area_gradient(state.fraction, state.mean_fraction)
-            area_slope = float(np.sum(gradient * fraction)) / scale
-        else:
-            # The area changes by whole cells, but on average it is nearly proportional to the load.
-            area_slope = self.area_fraction(state) * pressure_slope / self.pressure(state)
-        return replace(state, pressure_slope=pressure_slope, area_slope=area_slope, rates=(fraction, pressure))
+        states = self.in_contact(before), self.in_contact(after)
+        return patch_events(*states, energy, self.summit_cells, self.space.grid, self.spacing)
 
     def _energy_of_lone_cells(self, state, chosen):
         """Return the energy of chosen cells as in `_energy_of_cells`, J/m^2, without pressure on other cells."""
         others, cells, pressure = ~chosen, state.cells[chosen], state.pressure[chosen]
-        by_others = state.pressure[others] / self.contact_modulus
-        displaced = self.space.displacement(state.cells[others], by_others, cells) * self.spacing
-        return self._energy_of_cells(state)[chosen] - 0.5 * pressure * displaced
+        by_others = self.space.displacement(
+            self.field(state.cells[others], state.pressure[others] / self.contact_modulus)
+        )
+        if not self.space.free:
+            by_others -= by_others.mean()
+        return self._energy_of_cells(state)[chosen] - 0.5 * pressure * by_others.ravel()[cells] * self.spacing
 
     def _energy_of_cells(self, state):
         """Return the elastic energy minus the work of adhesion of each cell in contact, (k,), J/m^2."""
         elastic = 0.5 * state.pressure * (self.heights.ravel()[state.cells] - state.separation)
-        return elastic - self.law.material.surface_energy * adhesive_areas(state.fraction, state.mean_fraction)
+        if not self.adhesive:
+            return elastic
+        return elastic - self.law.material.surface_energy * self.attraction.adhesive_areas(
+            state.fraction, state.mean_fraction
+        )
 
 
 def contact_of(surface: Surface, material: Material) -> BoundaryElements:
@@ -302,28 +436,30 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
         square is thinner than a cell.
     """
     law, asperities, h = JKR(material), locate_summits(surface), surface.spacing
-    heights = np.pad(surface.profile, (0, MARGIN if surface.free else 0), constant_values=-np.inf)
-    column, row = (np.rint(asperities.position / h).astype(int) % surface.grid).T
-    cell = row * len(heights) + column
-    R = asperities.radius_of_curvature
-    jump_in = law.jump_in_approach(R)
-    above, radius = asperities.height - heights.ravel()[cell], law.contact_radius(jump_in, R)
-    summits = Summits(cell, above / h, -jump_in / h, radius / h)
-    strength = material.interface_strength / material.contact_modulus
-    front = Front(material.surface_energy / (material.contact_modulus * h), strength)
-    topography = Topography.of(heights / h)
-    if 0 < front.critical_opening < _SMALLEST_OPENING * topography.largest:
-        raise ValueError(
-            f"surface_energy: {material.surface_energy:g} J/m^2 is too small: rounding of heights up to "
-            f"{topography.largest * h:g} m hides the adhesion. Use zero or a larger value"
-        )
-    if not topography.largest:  # a flat punch, whose indentations are rounded like heights of the unit
-        topography = replace(topography, largest=surface.unit_height / h)
     layer = Layer(material.thickness / h, material.poisson_ratio) if material.layered else None
     if layer and surface.free and layer.thickness < 1:
         cell = f"{material.thickness:g} m is less than a grid cell of {h:g} m"
         raise ValueError(f"thickness: {cell}; expected a thicker layer or a finer grid")
-    space = HalfSpace.of(len(heights), layer, free=surface.free)
+    space = HalfSpace.under(surface.grid, layer, free=surface.free)
+    heights = np.pad(surface.profile, (0, space.grid - surface.grid), constant_values=-np.inf)
+    column, row = (np.rint(asperities.position / h).astype(int) % surface.grid).T
+    cell = row * len(heights) + column
+    largest = float(np.abs(heights, where=np.isfinite(heights), out=np.zeros_like(heights)).max())
+    attraction: NoAttraction | ShortRange | Cohesive = NoAttraction()
+    if material.surface_energy:
+        adhesion_length, strength = material.adhesion_length / h, material.interface_strength / material.contact_modulus
+        if attraction_on(material, h) == FINITE_RANGE:
+            attraction = Cohesive(adhesion_length, strength)
+        else:
+            R, above = asperities.radius_of_curvature, asperities.height - heights.ravel()[cell]
+            jump_in = law.jump_in_approach(R)
+            radius = law.contact_radius(jump_in, R)
+            attraction = ShortRange(adhesion_length, strength, cell, above / h, -jump_in / h, radius / h)
+        if attraction.reach * h < _SMALLEST_OPENING * largest:
+            raise ValueError(
+                f"surface_energy: {material.surface_energy:g} J/m^2 is too small: rounding of heights up to "
+                f"{largest:g} m hides the adhesion. Use zero or a larger value"
+            )
     return BoundaryElements(
         heights=heights,
         grid=surface.grid,
@@ -333,9 +469,8 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
         rms_slope=surface.unit_slope,
         asperities=asperities,
         space=space,
-        topography=topography,
-        front=front,
-        summits=summits,
+        attraction=attraction,
+        summit_cells=cell,
         shape=surface.shape,
     )
 

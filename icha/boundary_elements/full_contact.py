@@ -8,10 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from icha.asperity.jkr import JKR, MaterialUnits
-from icha.boundary_elements.adhesive import Summits
-from icha.boundary_elements.elastic_contact import Topography
-from icha.boundary_elements.front import Front
-from icha.boundary_elements.half_space import HalfSpace
+from icha.boundary_elements.elastic import HalfSpace
+from icha.boundary_elements.laws import Cohesive, NoAttraction, ShortRange
 from icha.boundary_elements.patches import CellState
 from icha.half_space.layer import softness_of
 from icha.surfaces.shapes import Shape
@@ -28,8 +26,7 @@ ROUNDING = 1e-9
 class FullContactProblem(MaterialUnits):
     """A rough surface against a half-space or layer: the contact problem, and its states of full contact.
 
-    Full contact has a closed form if the mean displacement is fixed (`HalfSpace.mean_is_fixed`). Otherwise it is found
-    like any other contact.
+    Full contact of a periodic surface has a closed form. That of a free square is found like any other contact.
 
     Parameters
     ----------
@@ -39,8 +36,8 @@ class FullContactProblem(MaterialUnits):
     law : contact law of a single summit; it gives the gap at which a summit jumps into contact.
     rms_height, rms_slope : units of length (m) and slope; those of the roughness, or of a surface with a shape.
     asperities : summits of the surface.
-    space, topography, front, summits : half-space, heights, law of the front and summits for the solver, in units of
-        the cell size and of E*.
+    space, attraction : elastic body and law of attraction, in units of the cell size and of E*.
+    summit_cells : (k,) int, cell of each summit.
     shape : shape that carries the roughness; None without a shape.
     """
 
@@ -52,15 +49,14 @@ class FullContactProblem(MaterialUnits):
     rms_slope: float
     asperities: Asperities
     space: HalfSpace
-    topography: Topography
-    front: Front
-    summits: Summits
+    attraction: NoAttraction | ShortRange | Cohesive
+    summit_cells: np.ndarray
     shape: Shape | None = None
 
     @cached_property
     def full_contact_pressure(self) -> np.ndarray:
         """Pressure in full contact minus its mean value, (n, n), Pa; without closed form zero."""
-        if not self.space.mean_is_fixed:
+        if self.space.free:
             return np.zeros_like(self.heights)
         side, softness = len(self.heights) * self.spacing, softness_of(self.law.material)
         return self.contact_modulus * full_contact_pressure(self.heights, side, softness=softness)
@@ -68,17 +64,22 @@ class FullContactProblem(MaterialUnits):
     @property
     def interface_strength(self) -> float:
         """Largest tension of closed cells that are not at a front, Pa; above it they open."""
-        return self.front.interface_strength * self.contact_modulus
+        return self.attraction.strength * self.contact_modulus
+
+    @property
+    def resolved_tension(self) -> float:
+        """Tension at which a cell at a straight edge opens, Pa: the largest tension that the grid resolves."""
+        return self.attraction.straight_strength * self.contact_modulus
 
     @property
     def smallest_gap(self) -> float:
         """Mean separation below which contact counts as full contact, m; -inf if it does not determine the gap."""
-        return _SMALLEST_GAP * self.rms_height if self.space.mean_is_fixed else -np.inf
+        return -np.inf if self.space.free else _SMALLEST_GAP * self.rms_height
 
     @property
     def opening_pressure(self) -> float:
         """Nominal pressure at which full contact opens on unloading, Pa; negative if this is a tension."""
-        if not self.space.mean_is_fixed:
+        if self.space.free:
             return np.inf
         return -float(self.full_contact_pressure.min()) - self.interface_strength
 
@@ -90,7 +91,7 @@ class FullContactProblem(MaterialUnits):
 
     def is_full(self, state: CellState) -> bool:
         """Return whether a state is full contact: all cells in contact at zero separation."""
-        return self.space.mean_is_fixed and state.separation == 0 and len(state.cells) == self.heights.size
+        return not self.space.free and state.separation == 0 and len(state.cells) == self.heights.size
 
     @property
     def undetermined_pressure(self) -> float:
@@ -104,8 +105,8 @@ class FullContactProblem(MaterialUnits):
         tension before opening is the strength of a front.
         """
         pressure = self.full_contact_pressure.ravel() - self.full_contact_pressure.min()
-        pressure -= self.front.straight_strength * self.contact_modulus
-        largest_gap = max(self.front.critical_opening * self.spacing, mean_gap)
+        pressure -= self.resolved_tension
+        largest_gap = max(self.attraction.reach * self.spacing, mean_gap)
         count = int(min(1 + mean_gap / largest_gap * pressure.size, pressure.size / 2))
         # Cells of equal pressure open together, so that a symmetric surface opens symmetrically.
         limit = np.partition(pressure, count - 1)[count - 1] + ROUNDING * self.contact_modulus

@@ -27,28 +27,30 @@ class PatchObservables:
     surface: Surface
 
     def of_contact(self) -> dict:
-        """Return the largest tension that the grid resolves, Pa: at this tension a cell at a straight edge opens."""
-        return {"resolved_tension": self.contact.front.straight_strength * self.contact.contact_modulus}
+        """Return the tension at which a cell at a straight edge opens, Pa."""
+        return {"resolved_tension": self.contact.resolved_tension}
 
     def of_step(self, state: CellState) -> dict:
         """Return residuals, number of pending cells, and share of summits in contact outside Wu's verified range."""
         contact = self.contact
-        touched = np.isin(contact.summits.cell, state.cells)
+        touched = np.isin(contact.summit_cells, state.cells)
         verified = contact.law.is_jump_in_verified(contact.asperities.radius_of_curvature[touched])
-        outside = np.count_nonzero(~verified) / max(len(verified), 1)
+        outside = np.count_nonzero(~verified) / max(len(verified), 1) if contact.divides_cells else 0.0
         # Every model has the first residual, "residual". In this model it is the residual of the gap.
         return {
             "residual": state.gap_residual / contact.rms_height,
-            "front_residual": state.front_residual,
+            "front_residual": state.residual,
             "gap_residual": state.gap_residual / contact.rms_height,
             "pending_count": state.pending,
             "layer_compression": self._layer_compression(state),
-            "outside_wu_fraction": outside if contact.adhesive else 0.0,
+            "outside_wu_fraction": outside,
+            "energetic_area_fraction": contact.energetic_area_fraction(state),
             **(self._extent(state) if self.surface.free else {}),
         }
 
     def _extent(self, state):
         """Return the radius of the convex hull of the cells in contact, m, and the share of contact at the edge."""
+        state = self.contact.in_contact(state)
         areas, at_edge = self.contact.area_of_cells(state), self.contact.at_edge(state)
         # A front is several cells wide, so only cells count that are mostly in contact.
         inside = state.cells[areas >= min(0.5, areas.max(initial=0.0))]
@@ -71,7 +73,7 @@ class PatchObservables:
         pressure, mean = self._pressure_density(state, areas)
 
         def field(*values):
-            return self.contact.crop(self.contact.space.field(*values))
+            return self.contact.crop(self.contact.field(*values))
 
         return {
             "overlap_fraction": 0.0,
@@ -79,7 +81,7 @@ class PatchObservables:
             "gap_density": self._gap_density(gap, state, areas),
             "pressure_density": pressure,
             "pressure_bin_mean": mean,
-            "contact_map": field(state.cells, state.fraction, np.float32),
+            "contact_map": field(state.cells, np.where(areas > 0, state.fraction, 0.0), np.float32),
             "contact_pressure": field(state.cells, state.pressure, np.float32),
             "gap_map": np.maximum(gap, 0.0).astype(np.float32),
             "displacement_map": self.contact.displacement(state).astype(np.float32),
@@ -97,15 +99,21 @@ class PatchObservables:
         """Return the probability density of the gap outside contact; its integral plus the area fraction is one."""
         edges_of_bins = gap_bins(self.surface)
         gap = np.clip(gap, 0.0, edges_of_bins[-1])
-        outside = 1 - self.contact.crop(self.contact.space.field(state.cells, areas))
+        outside = 1 - self.contact.crop(self.contact.field(state.cells, areas))
         content, _ = np.histogram(gap, edges_of_bins, weights=outside)
         return content / gap.size / np.diff(edges_of_bins)
 
     def _pressure_density(self, state, areas):
-        """Return the density of the pressure in contact (its integral is A/A0), and the mean pressure of each bin."""
+        """Return the density of the pressure, and the mean pressure of each bin.
+
+        At a finite range, it contains the tension on cells that attract across a gap.
+        """
         edges_of_bins = PRESSURE_BINS * self.contact.pressure_unit
-        # The force on a cell acts on its fraction in contact. One factor scales all fractions to the contact area.
-        weight = state.fraction * (np.sum(areas) / (np.sum(state.fraction) or 1.0))
+        if self.contact.divides_cells:
+            # The force on a cell acts on its fraction in contact. One factor scales all fractions to the contact area.
+            weight = state.fraction * (np.sum(areas) / (np.sum(state.fraction) or 1.0))
+        else:
+            weight = np.where(areas > 0, areas, 1.0)
         pressure = state.pressure / weight
         counted = np.clip(pressure, edges_of_bins[0], edges_of_bins[-1])
         content, _ = np.histogram(counted, edges_of_bins, weights=weight)
@@ -116,14 +124,14 @@ class PatchObservables:
     def _patches(self, state, areas):
         """Return position, area, perimeter, force, number of summits and radius of the highest summit of each patch."""
         contact, h = self.contact, self.contact.spacing
-        grid = contact.space.grid
+        grid, state, areas = contact.space.grid, contact.in_contact(state), areas[areas > 0]
         labels, count = label_patches(state.cells, grid)
 
         def sums(weight):
             return np.bincount(labels, weight, count + 1)[1:]
 
         area = sums(areas) * h**2
-        of_summit = labels_at(contact.summits.cell, state.cells, labels)
+        of_summit = labels_at(contact.summit_cells, state.cells, labels)
         order = np.argsort(contact.asperities.height, kind="stable")
         # A patch without a summit gets the radius of the rms curvature of the surface.
         radius = np.full(count + 1, self.surface.summit_radius)

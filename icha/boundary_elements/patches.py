@@ -25,10 +25,9 @@ class CellState:
     pressure : (k,), force on each cell divided by the area of the whole cell, Pa; negative in tension.
     mean_fraction : (k,), Gaussian average of the fractions of each cell and its neighbours; without adhesion not used.
     pressure_slope, area_slope : slopes dp/du of nominal pressure (Pa/m) and of area fraction (1/m), with moving fronts.
-    rates : changes of the fractions, (k,), and of the pressures in E*, (k,), when the separation increases by one cell
-        size; None if unknown.
-    front_residual : largest residual of the cells where the front can move (`front_solver.ActiveCells.residuals`).
-    gap_residual : largest gap of a closed cell, or largest overlap of the surfaces if that is larger, m.
+    rates : changes of the pressures in E*, (k,), when the separation increases by one cell size; None if unknown.
+    residual : largest residual pressure, relative to the largest pressure.
+    gap_residual : largest gap that the residual pressures would cause, m.
     pending : number of cells within reach (of summits, or overlapping) that stay open, because contact is not stable.
     history : events of the path up to this state, one `Events` for each equilibrium with events.
     """
@@ -40,8 +39,8 @@ class CellState:
     mean_fraction: np.ndarray
     pressure_slope: float = 0.0
     area_slope: float = 0.0
-    rates: tuple[np.ndarray, np.ndarray] | None = None
-    front_residual: float = 0.0
+    rates: np.ndarray | None = None
+    residual: float = 0.0
     gap_residual: float = 0.0
     pending: int = 0
     history: tuple[Events, ...] = ()
@@ -50,7 +49,8 @@ class CellState:
 def pack(state: CellState, before: CellState) -> dict[str, np.ndarray]:
     """Convert a state to named arrays for a checkpoint, with only those events that follow the state `before`."""
     arrays = {each.name: getattr(state, each.name) for each in fields(state) if each.name not in ("rates", "history")}
-    arrays |= {f"rates_{k}": rate for k, rate in enumerate(state.rates or ())}
+    if state.rates is not None:
+        arrays["rates"] = state.rates
     events = Events.concatenate(state.history[len(before.history) :])
     return arrays | {f"event_{name}": getattr(events, name) for name in Events.__match_args__}
 
@@ -59,9 +59,8 @@ def unpack(arrays: dict[str, np.ndarray], before: CellState) -> CellState:
     """Restore a state from the arrays of `pack`; `before` is the state before it on the path."""
     found = {each.name: arrays[each.name] for each in fields(CellState) if each.name in arrays}
     values: dict[str, Any] = {name: value if value.ndim else value.item() for name, value in found.items()}
-    rates = (arrays["rates_0"], arrays["rates_1"]) if "rates_0" in arrays else None
     events = Events(*(arrays[f"event_{name}"] for name in Events.__match_args__))
-    return CellState(**values, rates=rates, history=(*before.history, events) if len(events) else before.history)
+    return CellState(**values, history=(*before.history, events) if len(events) else before.history)
 
 
 # Overestimate of a counted area per free edge, divided by the area of a cell (Yastrebov, Anciaux & Molinari, Tribol.

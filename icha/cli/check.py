@@ -17,7 +17,7 @@ def check(
     For example, the areas of all spots must add up to the contact area. The command prints all problems of all files.
     Exit status: 0 if no file has problems, 1 if a file has problems, 2 if ICHA cannot read a file.
     """
-    from icha.datasets.format import CAMPAIGN, RUN, SOLUTION, SURFACE, UnknownFile, identify_file
+    from icha.datasets.format import CAMPAIGN, RUN, SURFACE, UnknownFile, identify_file
 
     status = 0
     for file in files:
@@ -27,7 +27,7 @@ def check(
             echo(f"Error: {error}", err=True, fg="red")
             status = WRONG
             continue
-        if kind not in (RUN, SURFACE, CAMPAIGN, SOLUTION):
+        if kind not in (RUN, SURFACE, CAMPAIGN):
             echo(f"{file}: {kind}; ICHA can read this file, but has no checks for this kind of file")
             continue
         try:
@@ -47,16 +47,16 @@ def check(
 
 def _problems(kind, data) -> tuple[list[str], int]:
     """Return the problems of a file, and the number of checks of the results."""
-    from icha.analysis.checks import COMPLETED, check_campaign, check_solution
+    from icha.analysis.checks import COMPLETED, check_campaign
     from icha.checks.run import check_run
-    from icha.datasets.format import RUN, SOLUTION, SURFACE, problems_with_file
+    from icha.datasets.format import RUN, SURFACE, problems_with_file
 
-    problems = problems_with_file(kind, data) if kind != SOLUTION else []
+    problems = problems_with_file(kind, data)
     if problems or kind == SURFACE:
         return problems, 0
     if kind == RUN and "incomplete" in data.attrs:
         return [f"the run failed: {data.attrs['incomplete']}"], 1
-    checks = (check_solution if kind == SOLUTION else check_run if kind == RUN else check_campaign)(data)
+    checks = (check_run if kind == RUN else check_campaign)(data)
     for check in checks:
         if not check.passed:
             subject = f"{check.subject}: " if check.subject else ""

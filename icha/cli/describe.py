@@ -121,7 +121,7 @@ def print_plan(path: Path, campaign, workflow: Path, home: Path, cores: int, *, 
     from icha.deposit.metadata import licence_problem
     from icha.planning.ownership import find_conflict
     from icha.planning.plan import FAILED, plan
-    from icha.planning.requirements import find_shortages, missing_software
+    from icha.planning.requirements import find_shortages
     from icha.planning.validity import expected_validity
     from icha.support.checksums import damaged
 
@@ -152,7 +152,6 @@ def print_plan(path: Path, campaign, workflow: Path, home: Path, cores: int, *, 
     obstacles = {
         "cannot be run": find_conflict(shorten_path(results), campaign.name, path, workflow),
         "cannot be published": problem and f"{shorten_path(path)}: {': '.join(problem)}",
-        "missing": missing_software(campaign),
     }
     for name, reason in obstacles.items():
         if reason:

@@ -16,15 +16,7 @@ from pydantic import AfterValidator, Field, PrivateAttr
 
 from icha.configuration.figures import Figures, Measurement
 from icha.configuration.publication import Line, Prose, Publication
-from icha.configuration.studies import (
-    BesideStudy,
-    BoundaryElementLoops,
-    BoundaryElements,
-    RmsHeight,
-    Study,
-    is_unread,
-    slope_of_height,
-)
+from icha.configuration.studies import RmsHeight, Study, is_unread, slope_of_height
 from icha.configuration.surfaces import AnySurface, MaterialSection
 from icha.contact.models import MODELS
 from icha.datasets.labels import is_derived_study
@@ -34,8 +26,6 @@ from icha.support.tables import read_columns
 from icha.support.values import Name, Problem, Section, Text, distinct
 from icha.surfaces.resolution import Resolution
 
-# In these sections, boundary elements solve contacts of a study.
-BESIDE_STUDIES = ("finite_range", "boundary_element_loops")
 # Largest number of entries in a section. The number is small, because the check of an entry goes through all runs of
 # its study.
 _FEW = Field(max_length=100)
@@ -120,12 +110,6 @@ class Campaign(Section):
     """Materials by name."""
     studies: Annotated[dict[Name, Study], Field(min_length=1)]
     """Studies by name."""
-    finite_range: Annotated[dict[Name, BoundaryElements], _FEW] = {}
-    """Solutions with boundary elements at a finite range of attraction, by name. ICHA compares the solutions with
-    the runs of a study."""
-    boundary_element_loops: Annotated[dict[Name, BoundaryElementLoops], _FEW] = {}
-    """Loops of loading and unloading with boundary elements at a finite range of attraction, by name. ICHA compares the
-    loops with the runs of a study that unloads."""
     measurements: Annotated[dict[Name, Measurement], _FEW] = {}
     """Your own measurements by name. Figure 5 shows the measurements together with the results of runs."""
     figures: Figures = Figures()
@@ -226,34 +210,6 @@ class Campaign(Section):
         """Return the object with the grid and the period of a surface; both are missing if its file is not read."""
         return self.topography(surface) or self.surfaces[surface]
 
-    def snapshots_of(self, study: str) -> list[tuple[str, float]] | None:
-        """Return kind and value of all states that the runs of a study save; None if runs save only the last target.
-
-        The result includes the loads at which entries of `finite_range` solve contacts of this study.
-        """
-        loads = sorted({p for e in self.finite_range.values() if e.study == study for p in e.reduced_pressures})
-        if self.studies[study].snapshots is None and not loads:
-            return None
-        snapshots = self.studies[study].own_snapshots
-        known = set(snapshots)
-        return snapshots + [state for p in loads if (state := ("reduced_pressure", p)) not in known]
-
-    def contacts_beside(self, entry: BesideStudy) -> list[Contact]:
-        """Return the contacts that an entry of `finite_range` or `boundary_element_loops` selects from its study."""
-        lists = (entry.surfaces, entry.seeds, entry.rms_slopes, entry.materials)
-        asked = [None if values is None else set(values) for values in lists]
-
-        def is_asked_for(contact):
-            # Surfaces from files have no seeds, and smooth surfaces have no rms slopes.
-            surface = self.surfaces[contact.surface]
-            without = {"seed": not surface.random, "rms_slope": surface.smooth}
-            return all(
-                values is None or value in values or without.get(name, False)
-                for name, value, values in zip(Contact._fields, contact, asked, strict=True)
-            )
-
-        return list(filter(is_asked_for, self.contacts(entry.study)))
-
     def problems(self) -> Iterator[Problem]:
         """Yield the problems that concern several values of the campaign, such as names that are not defined.
 
@@ -272,17 +228,12 @@ class Campaign(Section):
             yield from _within(("studies", label), self._model_problems(study))
             if is_derived_study(label, self.studies):
                 continue  # its problems are those of the study from which it is derived
-            yield from _within(("studies", label), study.problems(self.snapshots_of(label), *self.units_of(label)))
+            yield from _within(("studies", label), study.problems(*self.units_of(label)))
             yield from _within(("studies", label), self._tension_problems(study))
             yield from _within(("studies", label), self._edge_problems(study))
-        sections = {section: getattr(self, section) for section in (*BESIDE_STUDIES, "measurements")}
-        for section, entries in (sections | {"figures": self.figures.by_name()}).items():
+        for section, entries in {"measurements": self.measurements, "figures": self.figures.by_name()}.items():
             for label, entry in entries.items():
                 yield from _within((section, label), entry.problems(self))
-        for label in self.finite_range:
-            if label in self.studies and self.compares_models(label):
-                reason = "is also the name of a study with boundary elements; expected another name"
-                yield ("finite_range", label), label, reason
 
     def file_problems(self) -> Iterator[Problem]:
         """Yield a problem for each table of measurements, and each script of an own figure, that cannot be used."""

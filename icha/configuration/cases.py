@@ -1,16 +1,14 @@
-"""List the runs, solutions and surfaces of a campaign: labels, settings of the jobs, and checksums."""
+"""List the runs and surfaces of a campaign: labels, settings of the jobs, and checksums."""
 
 import hashlib
-import itertools
 import json
 from collections.abc import Callable
 from functools import partial
 
 from icha.configuration.campaign import Campaign
-from icha.configuration.studies import BesideStudy
 from icha.configuration.surfaces import MeasuredSurface
 from icha.contact.models import DEFAULT_MODEL
-from icha.datasets.labels import ContactLabels, RunLabels, SolutionLabels
+from icha.datasets.labels import RunLabels
 
 
 def run_cases(campaign: Campaign) -> list[RunLabels]:
@@ -21,24 +19,6 @@ def run_cases(campaign: Campaign) -> list[RunLabels]:
 def surface_cases(campaign: Campaign) -> list[tuple[str, int]]:
     """Return surface and seed of each topography that a campaign uses, without repetition."""
     return list(dict.fromkeys((case.surface, case.seed) for case in run_cases(campaign)))
-
-
-def solution_cases(campaign: Campaign) -> list[SolutionLabels]:
-    """Return the labels of all solutions of the section `finite_range`, in the order of its entries."""
-    return [
-        SolutionLabels(label, entry.study, *contact, pressure)
-        for label, entry in campaign.finite_range.items()
-        for contact, pressure in itertools.product(campaign.contacts_beside(entry), entry.reduced_pressures)
-    ]
-
-
-def loop_cases(campaign: Campaign) -> list[ContactLabels]:
-    """Return the labels of all loops of the section `boundary_element_loops`, in the order of its entries."""
-    return [
-        ContactLabels(label, *contact)
-        for label, entry in campaign.boundary_element_loops.items()
-        for contact in campaign.contacts_beside(entry)
-    ]
 
 
 def surface_settings(campaign: Campaign, name: str) -> dict:
@@ -57,45 +37,19 @@ def run_settings(campaign: Campaign, case: RunLabels) -> dict:
     """Return the settings that determine the results of a run, in SI units."""
     return {
         "material": campaign.materials[case.material].model_dump(exclude_none=True),
-        "path": campaign.studies[case.study].path_settings(campaign.snapshots_of(case.study)),
-        **_scale(campaign, case.study, case),
+        "path": campaign.studies[case.study].path_settings(),
+        **_scale(campaign, case),
         "seed": case.seed,
     } | ({} if case.model == DEFAULT_MODEL else {"model": case.model})
 
 
-def solution_settings(campaign: Campaign, case: SolutionLabels) -> dict:
-    """Return the settings of one solution of `finite_range`, in SI units, without the settings of its surface."""
-    entry = campaign.finite_range[case.entry]
-    return _solver_settings(campaign, entry, case) | {"reduced_pressure": case.reduced_pressure}
-
-
-def loop_settings(campaign: Campaign, case: ContactLabels) -> dict:
-    """Return the settings of one loop of `boundary_element_loops`, in SI units, without the settings of its surface."""
-    entry = campaign.boundary_element_loops[case.entry]
-    return _solver_settings(campaign, entry, case) | {
-        "largest_reduced_pressure": campaign.studies[entry.study].targets.last[1],
-        "separation_step": entry.separation_step,
-    }
-
-
-def _solver_settings(campaign: Campaign, entry: BesideStudy, case: SolutionLabels | ContactLabels) -> dict:
-    """Return the settings of the boundary-element solver, without loads."""
-    return {
-        "material": campaign.materials[case.material].model_dump(exclude_none=True),
-        **_scale(campaign, entry.study, case),
-        "seed": case.seed,
-        "refinement": entry.refinement,
-        "tolerance": entry.tolerance,
-    }
-
-
-def _scale(campaign: Campaign, study: str, case: RunLabels | SolutionLabels | ContactLabels) -> dict[str, float]:
+def _scale(campaign: Campaign, case: RunLabels) -> dict[str, float]:
     """Return the rms slope of a run, and its rms height if the study prescribes rms heights, m.
 
     The heights of each realisation are scaled to the rms height. Its rms slope then differs from that of the label,
     which is the slope of the spectrum, unless all realisations have the same ratio of height and slope.
     """
-    for height in campaign.studies[study].rms_heights or ():
+    for height in campaign.studies[case.study].rms_heights or ():
         if campaign.slope_of_height(case.surface, height) == case.rms_slope:
             return {"rms_slope": case.rms_slope, "rms_height": height}
     return {"rms_slope": case.rms_slope}

@@ -15,7 +15,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from icha.configuration.campaign import BESIDE_STUDIES, Campaign, Contact
+from icha.configuration.campaign import Campaign, Contact
 from icha.configuration.errors import MOST_PROBLEMS, problem_of
 from icha.configuration.samples import RULES
 from icha.configuration.studies import MEASURED, SCALARS, RmsHeight, Study, slope_of_height
@@ -89,7 +89,7 @@ def expand_design(campaign: Campaign, content: Mapping) -> tuple[Campaign, list[
     sections = {name: getattr(campaign, name) | derived for name, derived in variants.derived.items()}
     expanded = campaign.model_copy(update=sections | {"studies": studies}).with_runs(runs)
     expanded._origins = variants.origin
-    return expanded, list(_too_many_solutions(expanded))
+    return expanded, []
 
 
 def _study_of_inputs(study: Study) -> Study:
@@ -167,18 +167,10 @@ def _too_many_runs(campaign: Campaign) -> Iterator[Problem]:
     """Yield a problem if a campaign that is not yet expanded has too many runs or targets."""
     runs = targets = 0
     for label, study in campaign.studies.items():
-        count, states = _run_count(label, study), {*study.targets.states, *(campaign.snapshots_of(label) or ())}
+        count, states = _run_count(label, study), {*study.targets.states, *(study.saved_states or ())}
         runs, targets = runs + count, targets + count * (len(states) + len(study.turning_points))
     yield from _excess("studies", runs, "runs", MAX_RUNS)
     yield from _excess("studies", targets, "targets of all runs", _MAX_TARGETS)
-
-
-def _too_many_solutions(campaign: Campaign) -> Iterator[Problem]:
-    """Yield a problem if an expanded campaign has too many solutions in `finite_range` or `boundary_element_loops`."""
-    for section in BESIDE_STUDIES:
-        entries = [entry for entry in getattr(campaign, section).values() if entry.study in campaign.studies]
-        counts = (len(campaign.contacts_beside(e)) * len(getattr(e, "reduced_pressures", [0])) for e in entries)
-        yield from _excess(section, sum(counts), "solutions", MAX_RUNS)
 
 
 def _excess(section: str, count: int, what: str, most: int) -> Iterator[Problem]:

@@ -20,8 +20,6 @@ from icha.support.values import NAME_PATTERN, NOTHING, Problem
 MOST_PROBLEMS = 50
 # Messages for keys that were renamed or removed, by section and key.
 _FORMER_KEYS = {
-    ("Campaign", "boundary_elements"): "was renamed; expected the same section with the name `finite_range` (the "
-    "model `boundary_elements` of a study was not renamed)",
     ("Study", "united_until"): "was removed, because coalesced spots now split when their parts would no longer "
     "overlap. Remove the key",
 }

@@ -13,6 +13,7 @@ from icha.asperity.material import Material
 from icha.asperity.tabor import LEAST_TABOR, describe_short_range
 from icha.configuration.campaign import Campaign, Contact
 from icha.configuration.surfaces import SelfAffineSurface
+from icha.contact.attraction import FINITE_RANGE, attraction_on, resolving_spacing
 from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets.labels import coarse_study, is_derived_study
 from icha.path.targets import FORCE, NOMINAL_PRESSURE, QUANTITIES, UNITS
@@ -224,7 +225,7 @@ def resolution_of_smooth(campaign: Campaign, study: str, contact: Contact) -> Re
 
 
 def long_ranges(campaign: Campaign) -> Iterator[Unusual]:
-    """For each material, yield the range of attraction if a short range is a bad assumption for boundary elements."""
+    """For each material, yield the range of attraction if boundary elements badly assume a short range."""
     found: dict[str, tuple[float, Unusual]] = {}
     for name in campaign.studies:
         of_cells = [contact for model, contact in campaign.runs(name) if MODELS[model].by_cells]
@@ -233,10 +234,15 @@ def long_ranges(campaign: Campaign) -> Iterator[Unusual]:
             origin = campaign.origin("materials", contact.material)
             if value is None or value >= min(LEAST_TABOR, found.get(origin, (math.inf,))[0]):
                 continue
-            reach = formatting.length(campaign.materials[contact.material].interaction_range)
-            source = f" for boundary elements of {contact.material} on {contact.surface}, which assume a short range; "
-            source += describe_short_range(value)
-            expected = f"a Tabor parameter of at least {LEAST_TABOR:g}"
+            material = Material(**campaign.materials[contact.material].model_dump(exclude_none=True))
+            spacing = campaign.period(contact.surface) / campaign.grid(contact.surface)
+            if attraction_on(material, spacing) == FINITE_RANGE:
+                continue
+            reach = formatting.length(material.interaction_range)
+            cells = formatting.length(resolving_spacing(material), 3)
+            source = f" for boundary elements of {contact.material} on {contact.surface}, which assume a short range, "
+            source += f"because the grid does not resolve it; {describe_short_range(value)}"
+            expected = f"a Tabor parameter of at least {LEAST_TABOR:g}, or grid cells of at most {cells}"
             found[origin] = value, Unusual(("materials", origin, "interaction_range"), reach, expected, source)
     yield from (unusual for _, unusual in found.values())
 

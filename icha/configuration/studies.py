@@ -1,4 +1,4 @@
-"""Sections `studies`, `finite_range` and `boundary_element_loops`; entries of the last two refer to a study."""
+"""Section `studies`: runs for all combinations of surfaces, seeds, slopes and materials."""
 
 import itertools
 import math
@@ -16,8 +16,6 @@ from pydantic import (
     model_validator,
 )
 
-from icha.asperity.cohesive_zone import resolution_problem
-from icha.asperity.material import Material
 from icha.configuration.samples import Sample
 from icha.configuration.surfaces import SURFACE_KINDS, MaterialSection, MeasuredSurface
 from icha.contact.models import DEFAULT_MODEL, MODELS
@@ -42,14 +40,12 @@ from icha.path.targets import (
     Path,
 )
 from icha.support.formatting import format_quantity, length
-from icha.support.rules import REFINEMENT, SLOPE, TOLERANCE, FloatRange
+from icha.support.rules import SLOPE, FloatRange
 from icha.support.values import (
     Force,
-    Label,
     Length,
     Name,
     OrSchema,
-    Positive,
     Pressure,
     Problem,
     Section,
@@ -60,14 +56,11 @@ from icha.support.values import (
     distinct,
     exactly_one,
     increasing,
-    integer,
-    list_names,
     list_of_names,
     number,
     quantity,
     stops,
     to_number,
-    unknown,
 )
 
 # Value of `rms_slopes` that means the measured slope of a topography.
@@ -312,8 +305,9 @@ class Study(Section):
     """Cases whose parameters are drawn from distributions, instead of `vary`, `zip` and `cases`. ICHA computes which
     share of the variance each parameter causes. The study needs one surface, one material and one rms slope."""
     models: Annotated[list[Literal[tuple(MODELS)]], Field(min_length=1), AfterValidator(distinct)] = [DEFAULT_MODEL]
-    """Contact models of every run. `asperities` is fast. `boundary_elements` assumes a very short range of attraction,
-    and needs a grid with at least 4 (better 8) cells per shortest wavelength. On a surface with free edges, boundary
+    """Contact models of every run. `asperities` is fast. `boundary_elements` has the `interaction_range` of the
+    material where the grid resolves this range, and otherwise the limit of a short range. It needs a grid with at least
+    4 (better 8) cells per shortest wavelength. On a surface with free edges, boundary
     elements take about four times as long as on a periodic surface."""
     error_check: StrictBool = False
     """If true, boundary elements also compute the first seed of each surface, slope and material, so that ICHA measures
@@ -351,17 +345,18 @@ class Study(Section):
         return PILOT if self.levels is None and self.accuracy is not None else self.levels
 
     @property
-    def own_snapshots(self) -> list[tuple[str, float]]:
-        """Kind and value (SI units) of each state that the study's runs save, without the loads of `finite_range`."""
+    def saved_states(self) -> list[tuple[str, float]] | None:
+        """Kind and value (SI units) of each state that the runs save; None if runs save only the last target."""
         if self.snapshots is None:
-            return [self.targets.last]
+            return None
         if self.snapshots == EVERY_STOP:
             return self.targets.states
         return [snapshot.kind_and_value for snapshot in self.snapshots]
 
-    def path_settings(self, snapshots: list[tuple[str, float]] | None) -> dict:
+    def path_settings(self) -> dict:
         """Return the arguments of `icha.Path` for the runs of the study, without unused arguments."""
-        settings = self.targets.model_dump(exclude_none=True) | {"snapshots": snapshots, "max_step": self.max_step}
+        settings = self.targets.model_dump(exclude_none=True)
+        settings |= {"snapshots": self.saved_states, "max_step": self.max_step}
         if self.unload or self.turning_points:
             settings |= {
                 "unload": self.unload,
@@ -374,7 +369,6 @@ class Study(Section):
 
     def problems(
         self,
-        snapshots: list[tuple[str, float]] | None,
         pressure_unit: float = math.inf,
         force_unit: float = math.inf,
         side: float = math.inf,
@@ -383,7 +377,6 @@ class Study(Section):
 
         Parameters
         ----------
-        snapshots : states from `Campaign.snapshots_of`.
         pressure_unit : smallest E* h'rms of all contacts, Pa; infinite if it is unknown.
         force_unit : smallest E* A0 h'rms of all contacts, N; infinite if it is unknown.
         side : side of the smallest surface, m; infinite if it is unknown.
@@ -414,9 +407,9 @@ class Study(Section):
                 limit = f"A/A0 = {MAX_AREA_FRACTION:g}, the limit of the asperity model" if by_summits else "the square"
                 reason = f"is too large on a square of side {length(side)}"
                 yield location, value, f"{reason}; expected at most {length(largest_radius, 4)} ({limit})"
-        saved = any(kind.startswith(UNLOADING) for kind, _ in snapshots or ())
+        saved = any(kind.startswith(UNLOADING) for kind, _ in self.saved_states or ())
         if self.unload or self.turning_points or saved or self.control != "separation":
-            yield from self._path_problems(snapshots)
+            yield from self._path_problems()
 
     def states(self) -> Iterator[tuple[tuple, str, float]]:
         """Yield location (keys), kind and value of each target, snapshot and turning point."""
@@ -429,10 +422,10 @@ class Study(Section):
                 kind = kind.removeprefix(UNLOADING)
                 yield (key, k, kind), kind, value
 
-    def _path_problems(self, snapshots):
+    def _path_problems(self):
         """Yield a problem if `icha.Path` refuses the settings."""
         try:
-            Path(**self.path_settings(snapshots))
+            Path(**self.path_settings())
         except ValueError as error:
             key, _, reason = str(error).partition(": ")
             name, _, index = key.partition("[")
@@ -441,85 +434,3 @@ class Study(Section):
                 kind, value = value[int(index.rstrip("]"))].kind_and_value
                 location = (name, int(index.rstrip("]")), kind.removeprefix(UNLOADING))
             yield location, value, reason.removeprefix(f"{value!r} ")
-
-
-_Labels = list_of_names(Label)
-
-
-class BesideStudy(Section):
-    """Settings of boundary elements that solve the contacts of a study at a finite range of attraction."""
-
-    study: Name
-    """Name of the study with the topographies."""
-    surfaces: _Labels | None = None
-    """Names of surfaces. Contacts on these surfaces are solved. Default: all surfaces of the study."""
-    seeds: Seeds | None = None
-    """Seeds. Contacts with these seeds are solved. Default: all seeds of the study."""
-    rms_slopes: Annotated[list[Positive], Field(min_length=1), AfterValidator(distinct)] | None = None
-    """Rms slopes. Contacts at these slopes are solved. Default: all rms slopes of the study."""
-    materials: _Labels | None = None
-    """Names of materials. Contacts with these materials are solved. Default: all materials of the study. The grid must
-    resolve the `interaction_range` of materials with adhesion."""
-    tolerance: number(TOLERANCE) = 1e-8
-    """The solver stops when its relative error is below this value."""
-    refinement: integer(REFINEMENT) = 1
-    """Number of nodes along a side of the solver's grid, divided by the number of nodes along a side of the surface's
-    grid. Heights between the nodes of the surface are interpolated."""
-
-    def problems(self, campaign: Any) -> Iterator[Problem]:
-        """Yield the problems of this entry: names that are not defined, and contacts that cannot be solved."""
-        yield from unknown(("study",), self.study, campaign.studies)
-        if self.study in campaign.studies:
-            yield from self._study_problems(campaign, campaign.studies[self.study])
-
-    def _study_problems(self, campaign, study):
-        if DEFAULT_MODEL not in study.models:
-            reason = f"has no runs to compare with; expected a study with {DEFAULT_MODEL!r} among its `models`"
-            yield ("study",), self.study, reason
-        for key in ("surfaces", "seeds", "rms_slopes", "materials"):
-            known = set(getattr(study, key))
-            for index, value in enumerate(getattr(self, key) or []):
-                if value not in known:
-                    expected = list_names(getattr(study, key))
-                    yield (key, index), value, f"is not in study {self.study!r}; expected one of {expected}"
-        contacts = campaign.contacts_beside(self)
-        if not contacts and not any(map(is_unread, study.rms_slopes)):
-            reason = "has no run with these surfaces, seeds, slopes and materials; expected combinations of the study"
-            yield ("study",), self.study, reason
-        pairs = list(dict.fromkeys((each.surface, each.material) for each in contacts))
-        for label in dict.fromkeys(label for _, label in pairs):
-            if campaign.materials[label].thickness is not None:
-                reason = f"contains the layer {label!r}; expected a study of materials without `thickness`"
-                yield ("study",), self.study, reason
-        for name in dict.fromkeys(name for name, _ in pairs):
-            if campaign.is_free(name):
-                reason = f"contains the surface {name!r} with free edges; expected a study of periodic surfaces"
-                yield ("study",), self.study, reason
-            elif campaign.grid(name) is not None:
-                nodes = campaign.grid(name) * self.refinement
-                for label in (material for surface, material in pairs if surface == name):
-                    material = Material(**campaign.materials[label].model_dump(exclude_none=True))
-                    if problem := resolution_problem(material, campaign.period(name) / nodes):
-                        yield ("materials",), label, f"on surface {name!r}: {problem}"
-
-
-class BoundaryElements(BesideStudy):
-    """Boundary elements that solve the contacts of a study at a finite range of attraction, for comparison."""
-
-    reduced_pressures: stops(number(FloatRange(least=LEAST_PRESSURE, most=LARGEST_REDUCED_PRESSURE)), increasing)
-    """Reduced pressures p/(E* h'rms), increasing. The contact is solved at each pressure, and the runs of the study
-    save a snapshot at each pressure."""
-
-
-class BoundaryElementLoops(BesideStudy):
-    """Boundary elements at a finite range of attraction: loading to the largest load of a study, then unloading."""
-
-    separation_step: number(STEP) = 0.05
-    """Change of the mean gap from one solution to the next, in units of the rms height."""
-
-    def _study_problems(self, campaign, study):
-        """Yield the problems of the base class, and a problem if the study does not unload from a reduced pressure."""
-        if not study.unload or study.turning_points or study.targets.last[0] != "reduced_pressure":
-            reason = "does not unload after its last reduced pressure; expected a study with `reduced_pressures`, "
-            yield ("study",), self.study, f"{reason}`unload: true` and no turning points"
-        yield from super()._study_problems(campaign, study)

@@ -104,7 +104,8 @@ class MaterialSection(Section):
     surface_energy: SurfaceEnergy
     """Work of adhesion Δγ. The value `0 J/m^2` means no adhesion."""
     interaction_range: Length = Field(default=f"{VAN_DER_WAALS_RANGE * 1e9:g} nm", validate_default=True)
-    """Range ε of the attraction. The range determines when asperities jump into contact. The Tabor parameter is μ =
+    """Range ε of the attraction. The range determines when asperities jump into contact. Boundary elements have this
+    range if the grid resolves it. The Tabor parameter is μ =
     (RΔγ²/E*²)^(1/3)/ε, where 1/R is the rms curvature of the surface. The default is about the distance between
     molecules, as for van der Waals forces."""
     flaw_radius: Length | None = None

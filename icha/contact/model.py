@@ -110,6 +110,7 @@ class ContactModel(Protocol):
     Attributes
     ----------
     adhesive : whether there is adhesion, so that contact forms and breaks in jumps.
+    is_unique : whether each load has only one equilibrium, which does not depend on the path.
     contact_modulus : E*, the unit of relative loads, Pa.
     pressure_unit : E* h'_rms, the unit of reduced pressures, Pa.
     rms_height : unit of separations, m: rms height of the surface, with a shape `Surface.unit_height`.
@@ -122,6 +123,7 @@ class ContactModel(Protocol):
     """
 
     adhesive: bool
+    is_unique: bool
     contact_modulus: float
     pressure_unit: float
     rms_height: float

@@ -125,8 +125,8 @@ MODELS = {
     REFERENCE_MODEL: Model(
         words="boundary elements",
         title="boundary elements",
-        method="boundary elements in the limit of a short range of attraction, fronts at Griffith's energy release "
-        "rate",
+        method="boundary elements, at the range of attraction if the grid resolves it, otherwise in the limit of a "
+        "short range with fronts at Griffith's energy release rate",
         references="A. A. Griffith, Phil. Trans. R. Soc. A 221 (1921) 163-198, doi:10.1098/rsta.1921.0006; "
         "K. L. Johnson, K. Kendall and A. D. Roberts, Proc. R. Soc. A 324 (1971) 301-313, doi:10.1098/rspa.1971.0141; "
         f"{_WU}",
@@ -136,14 +136,21 @@ MODELS = {
             "front_residual": (
                 ("step",),
                 "1",
-                "largest deviation from 1, along the edges of contact, of sqrt(energy release rate over surface "
-                "energy)",
+                "largest residual pressure, over the peak tension of a cell at the edge or, without adhesion, over the "
+                "largest pressure",
                 "float64",
             ),
             "gap_residual": (
                 ("step",),
                 "1",
-                "largest gap in contact, or overlap out of contact, over h_rms",
+                "largest displacement by the residual pressures, over h_rms",
+                "float64",
+            ),
+            "energetic_area_fraction": (
+                ("step",),
+                "1",
+                "energy of adhesion divided by that of full contact; at a finite range of attraction, the integral of "
+                "(1 - gap/range)^2 over the nominal area",
                 "float64",
             ),
             "layer_compression": (
@@ -156,12 +163,18 @@ MODELS = {
             "resolved_tension": (
                 (),
                 "Pa",
-                "largest tension that the grid resolves at the edge of contact; 0 without adhesion",
+                "tension at which a cell at a straight edge of contact opens; 0 without adhesion. At a finite range of "
+                "attraction, the strength of the interface; otherwise the largest tension that the grid resolves",
                 "float64",
             ),
             "contact_map": (_MAP, "1", "part of the cell that is in contact", "float32"),
             "contact_pressure": (_MAP, "Pa", "pressure in the cell, negative in tension", "float32"),
-            "gap_map": (_MAP, "m", "gap at the node; in partly closed cells, extension of the bond", "float32"),
+            "gap_map": (
+                _MAP,
+                "m",
+                "gap at the node; where part of the cell is in contact, extension of the bond",
+                "float32",
+            ),
             "displacement_map": (
                 _MAP,
                 "m",

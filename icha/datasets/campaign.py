@@ -26,6 +26,8 @@ from icha.path.targets import BETWEEN
 
 # Variables of the campaign dataset that describe a run; datasets of runs do not have these variables.
 _OF_EVERY_CAMPAIGN = ("status", "step_count", "failure")
+# Variables of the campaign dataset that are attributes of a run.
+_TEXTS = ("applicability", "attraction")
 
 
 def campaign_tree(
@@ -79,7 +81,7 @@ def select_run(tree: xr.DataTree, labels: RunLabels | tuple) -> xr.Dataset:
     The returned dataset has the attributes of the file of the run. Some attributes explain the status of the run:
     `incomplete` (why the run failed), `beyond_model` (why the run ended at the limit of the model), `failed_checks`
     (which checks failed), `failed_loss_checks` (which checks of the loss failed; the run then has no variables of the
-    loss), and `applicability` (why the model is not applicable).
+    loss), and `applicability` (why the model is not applicable). `attraction` names the law of attraction.
 
     Raises
     ------
@@ -109,7 +111,7 @@ def variables_of_run(tree: xr.DataTree, labels: RunLabels | tuple) -> tuple[dict
     if ended_early:
         overlap = study.variables["overlap_fraction"].transpose(*LABELS, "snapshot")[place].values
         index["snapshot"] = np.flatnonzero(np.isfinite(overlap))
-    left_out = {*_OF_EVERY_CAMPAIGN, "applicability", *(f"{dim}_{label}" for dim in RAGGED for label in LABELS)}
+    left_out = {*_OF_EVERY_CAMPAIGN, *_TEXTS, *(f"{dim}_{label}" for dim in RAGGED for label in LABELS)}
     left_out |= {name for model, names in FURTHER.items() if model != labels.model for name in names}
     left_out |= OF_LOSS if int(status) == FAILED_LOSS else set()
     variables = {}
@@ -131,7 +133,9 @@ def variables_of_run(tree: xr.DataTree, labels: RunLabels | tuple) -> tuple[dict
     attrs = study.attrs | {"contact_model": labels.model}
     if int(status) in STATUS_ATTRIBUTES:
         attrs[STATUS_ATTRIBUTES[int(status)]] = failure.item()
-    attrs["applicability"] = study.variables["applicability"].transpose(*LABELS)[place].item()
+    for name in _TEXTS:
+        if name in study.variables:  # not in campaigns of earlier versions
+            attrs[name] = study.variables[name].transpose(*LABELS)[place].item()
     return variables, attrs
 
 

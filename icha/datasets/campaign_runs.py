@@ -40,7 +40,7 @@ _DIMS = {name: description.dims for name, description in (RUN | OF_MODELS | CYCL
 # Two units of slopes count as equal up to this relative difference, because scaling of surfaces causes rounding errors.
 _SAME_UNIT = 1e-9
 _ENDED_EARLY = (INCOMPLETE, BEYOND_MODEL)
-_ATTRIBUTES = ("contact_model", "config_sha256", "applicability", *STATUS_ATTRIBUTES.values())
+_ATTRIBUTES = ("contact_model", "config_sha256", "applicability", "attraction", *STATUS_ATTRIBUTES.values())
 
 
 def read_run_values(path: str | os.PathLike) -> tuple[Values, dict[str, str]]:
@@ -81,6 +81,7 @@ class Entry(NamedTuple):
     status : status of the run before ICHA checks that the run has all snapshots of its study.
     failure : reason why the run is not complete; "" for a complete run.
     applicability : reason why the model is not applicable to the run; "" if it is applicable.
+    attraction : law of attraction of boundary elements; "" for the asperity model.
     unit_slope : unit of slopes of the run, to which its bins of pressures are proportional; NaN if it has none.
     """
 
@@ -94,6 +95,7 @@ class Entry(NamedTuple):
     status: int
     failure: str
     applicability: str
+    attraction: str
     unit_slope: float
 
     @property
@@ -143,6 +145,7 @@ def spool_runs(
             stored.setdefault(snapshots, snapshots),
             *_status_and_failure(attrs),
             str(attrs.get("applicability", "")),
+            str(attrs.get("attraction", "")),
             float(values["unit_slope"][1]) if "unit_slope" in values else np.nan,
         )
         pickle.dump(values, spool, protocol=5)
@@ -185,7 +188,8 @@ class Arrangement:
     Attributes
     ----------
     name : name of the study.
-    known : values of the variables that list the runs: labels, `status`, `step_count`, `failure`, `applicability`.
+    known : values of the variables that list the runs: labels, `status`, `step_count`, `failure`,
+        `applicability`, `attraction`.
     variables : variables of all models, each from one run as an example.
     coordinates : names of the variables that are coordinates.
     origins : global attributes of one run of every model.
@@ -307,6 +311,7 @@ def _arrange_study(name: str, found: dict[RunLabels, Entry], design: list[RunLab
             "step_count": spread(_sizes(entries, "step"), 0, np.int32),
             "failure": spread((failure for _, failure in outcomes), "", object),
             "applicability": spread((entry.applicability for entry in entries), "", object),
+            "attraction": spread((entry.attraction for entry in entries), "", object),
         },
         variables={key: variable for key, variable in variables.items() if key not in LABELS},
         coordinates={*samples[0].coords, *LABELS},

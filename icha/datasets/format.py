@@ -21,7 +21,6 @@ from icha.datasets.variables.terms import Table, is_refused
 from icha.support.input_files import bounded_memory, most_memory, problem_with_path, refuse_traps, require_room
 
 RUN, SURFACE, CAMPAIGN = "run dataset", "surface file", "campaign dataset"
-SOLUTION = "boundary-element solution at a finite range"
 # Kinds of files whose format may change in later versions, each with a variable that no other kind has.
 _OTHERS = {
     "comparison of runs at common loads": "seed_count",
@@ -29,8 +28,6 @@ _OTHERS = {
     "answers of studies": "estimate_low",
     "sampled cases of studies": "effect_value",
     "theories and published points": "bush_gibson_thomas_area_fraction",
-    SOLUTION: "target_reduced_pressure",
-    "boundary-element loop at a finite range": "dissipated",
 }
 
 # A file must not have attributes with these words in their names, because the same input must give the same bytes.

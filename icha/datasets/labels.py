@@ -1,4 +1,4 @@
-"""Labels of runs and of reference solutions, and the indices of labels in a dataset.
+"""Labels of runs, and the indices of labels in a dataset.
 
 Labels, such as surface and material, are the dimensions of a dataset. The values of the labels are the coordinates of
 the dataset. If all surfaces have the same rms slopes, the coordinate `rms_slope` has one dimension. Measured surfaces
@@ -13,16 +13,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from icha.contact.models import DEFAULT_MODEL, MODELS
+from icha.contact.models import MODELS
 
 if TYPE_CHECKING:
     import xarray as xr
 
 # Patterns of paths in the folder of a kind of file, without file extension. Fields stand in braces.
 RUN = "{study}/{surface}/seed{seed}/slope{slope}/{model_folder}{material}"
-CONTACT = "{entry}/{surface}/seed{seed}/slope{slope}/{material}"
-SOLUTION = CONTACT + "/p{pressure}"
-_NUMBERS = {"rms_slope": "slope", "reduced_pressure": "pressure"}
 # Two rms slopes count as equal up to this relative difference, because scaling of surfaces causes rounding errors.
 _SAME_SLOPE = 1e-9
 
@@ -78,54 +75,10 @@ class RunLabels(NamedTuple):
 LABELS = RunLabels._fields[1:]
 
 
-class ContactLabels(NamedTuple):
-    """Labels of a reference solution that an entry of `finite_range` or `boundary_element_loops` requests."""
-
-    entry: str
-    surface: str
-    seed: int
-    rms_slope: float
-    material: str
-
-    @property
-    def path(self) -> str:
-        """Path of the solution's file in the folder for this kind of file, without file extension."""
-        return CONTACT.format(**path_fields(self))
-
-
-class SolutionLabels(NamedTuple):
-    """Labels of a boundary-element solution: entry of the configuration, labels of the compared run, and load."""
-
-    entry: str
-    study: str
-    surface: str
-    seed: int
-    rms_slope: float
-    material: str
-    reduced_pressure: float
-
-    @property
-    def run(self) -> RunLabels:
-        """Labels of the asperity run that is compared with the solution."""
-        return RunLabels(self.study, DEFAULT_MODEL, *self[2:6])
-
-    @property
-    def path(self) -> str:
-        """Path of the solution's file in the folder of solutions, without file extension."""
-        return SOLUTION.format(**path_fields(self))
-
-    def __str__(self):
-        """Return the path of the solution."""
-        return self.path
-
-
-def path_fields(labels: RunLabels | ContactLabels | SolutionLabels) -> dict[str, str]:
+def path_fields(labels: RunLabels) -> dict[str, str]:
     """Return the text for each field in a path pattern, by name of the field."""
-    found = {
-        _NUMBERS.get(name, name): number_label(value) if name in _NUMBERS else str(value)
-        for name, value in labels._asdict().items()
-    }
-    return found | ({"model_folder": model_folder(labels.model)} if isinstance(labels, RunLabels) else {})
+    slope = {"slope": number_label(labels.rms_slope), "model_folder": model_folder(labels.model)}
+    return {name: str(value) for name, value in labels._asdict().items()} | slope
 
 
 def number_label(value: float) -> str:

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from icha.datasets import labels
 
 SURFACE = "surfaces/{surface}/seed{seed}.nc"
 RUN = f"runs/{labels.RUN}.nc"
 THEORIES = "references/{surface}.nc"
-SOLUTION = f"references/boundary_elements/{labels.SOLUTION}.nc"
-LOOP = f"references/loops/{labels.CONTACT}.nc"
 DATASET = "dataset/{campaign}.nc"
 TABLE = "dataset/{campaign}.csv"
 COMPARISON = "aggregated/{campaign}.nc"
@@ -46,7 +43,7 @@ class ResultFiles:
     campaign: str
     folder: str = ""
 
-    def path(self, pattern: str, case: NamedTuple | None = None, **names: object) -> str:
+    def path(self, pattern: str, case: labels.RunLabels | None = None, **names: object) -> str:
         """Return the path of one file from a pattern; `case` and `names` give the values of names in braces."""
         of_case = {} if case is None else labels.path_fields(case)
         return "/".join(filter(None, (self.folder, pattern.format(campaign=self.campaign, **of_case, **names))))
@@ -60,7 +57,4 @@ def job_file(path: str, kind: str, ending: str) -> str:
     path : path of the file, relative to the folder of results.
     kind, ending : folder and file extension: either `logs` and `.log`, or `benchmarks` and `.jsonl`.
     """
-    folder, _, rest = path.partition("/")
-    # Each kind of reference solution has a folder in `references`; the files of theories are directly in `references`.
-    job = rest if folder == "references" and "/" in rest else path
-    return f"{kind}/{job.rpartition('.')[0]}{ending}"
+    return f"{kind}/{path.rpartition('.')[0]}{ending}"

@@ -10,16 +10,16 @@ from pathlib import Path
 import netCDF4
 import numpy as np
 
-from icha.datasets.results import LOOP, RUN, SOLUTION, SURFACE, THEORIES
+from icha.datasets.results import RUN, SURFACE, THEORIES
 from icha.datasets.table import name_and_unit
 
 _COLUMNS = "file group variable dimensions type units long_name flags missing comment files".split()
 # Placeholders for the parts of a path that differ between files of one kind.
-_PLACEHOLDERS = {name: f"<{name}>" for name in ("study", "entry", "surface", "material")}
-_PLACEHOLDERS |= {"seed": "<k>", "slope": "<g>", "pressure": "<load>"}
+_PLACEHOLDERS = {name: f"<{name}>" for name in ("study", "surface", "material")}
+_PLACEHOLDERS |= {"seed": "<k>", "slope": "<g>"}
 _KINDS = [
     pattern.format(**_PLACEHOLDERS, model_folder=folder)
-    for pattern in (SURFACE, RUN, SOLUTION, LOOP, THEORIES)
+    for pattern in (SURFACE, RUN, THEORIES)
     for folder in ("", "<model>/")
 ]
 

@@ -28,7 +28,6 @@ from icha.datasets.variables.campaign import (
 from icha.deposit.metadata import TABLES, acknowledgement, find_licence, paragraphs, web_address
 from icha.deposit.verify import COMPUTED
 from icha.planning.costs import Cost
-from icha.planning.requirements import further_software
 from icha.support import formatting
 
 _TEMPLATE = "README.md.jinja"
@@ -118,7 +117,6 @@ def _settings(campaign: Campaign) -> dict:
         "self_affine": any(isinstance(each, SelfAffineSurface) for each in surfaces.values()),
         "adhesive": any(material.surface_energy > 0 for material in campaign.materials.values()),
         "both_ways": any(study.unload or study.turning_points for study in campaign.studies.values()),
-        "installed": (*further_software(campaign), "environment")[0],
         "free": any(campaign.is_free(name) for name in campaign.surfaces),
     }
 

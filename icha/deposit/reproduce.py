@@ -28,7 +28,7 @@ SMALLEST = "smallest"
 # Two files in the source of a deposit: one with the version of the program, one with the versions of all packages.
 _PYPROJECT, _LOCK = f"{SOURCE}/pyproject.toml", f"{SOURCE}/uv.lock"
 # Packages that compute or read the numbers of results. All other packages draw, write, check or schedule.
-_COMPUTING = {"finufft", "mugrid", "numpy", "pandas", "scipy", "surfacetopography", "tamaas"}
+_COMPUTING = {"finufft", "mugrid", "numpy", "pandas", "scipy", "surfacetopography"}
 # Entries in the folder of a rerun: file with the checksum of SHA256SUMS, and folder for configuration and results.
 _BEGUN, _PROJECT = "rerun-of.sha256", "data"
 _RUN = re.compile(r"runs(/[^/]+){4}/[^/]+\.nc")

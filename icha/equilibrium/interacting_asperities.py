@@ -40,6 +40,7 @@ class InteractingAsperities(AsperityContact):
     # Largest contact area fraction of a state. A target is at most 0.25, but the search for a target may exceed 0.25.
     largest_area_fraction = 1.5 * 0.25
     area_step = 0.0
+    is_unique = False
     path_accuracy = MODELS[DEFAULT_MODEL].accuracy
 
     def untouched(self) -> ContactState:

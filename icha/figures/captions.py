@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from icha.contact.attraction import FINITE_RANGE, SHORT_RANGE
 from icha.datasets.labels import LABELS, slopes_of
-from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
 from icha.figures.select import has_shape, lacks_sphere
 
 if TYPE_CHECKING:
@@ -53,14 +53,15 @@ def texts_of(figure: Figure, data: Mapping[str, object], studies: Sequence[str])
 
     Words are the names of the `data`, and words for the `studies` that are shown: materials that are `bare`, `adhesive`
     or `with and without adhesion`; `several surfaces`, `several slopes`, `bare at several slopes`, `adhesive at several
-    slopes`, `one seed`, `periodic` surfaces, `units of a shape`, runs `without a sphere`; boundary elements with
-    which the model was compared, `in the limit` or `at finite range`.
+    slopes`, `one seed`, `periodic` surfaces, `units of a shape`, runs `without a sphere`; and boundary
+    elements `in the limit`, `at finite range` or of `both ranges`.
     """
     from matplotlib.text import Text
 
     words = [*data, *(text.get_text() for text in figure.findobj(Text))]
     has_units = any(r"\mathrm{rms}" in word for word in words)
     campaign = data["campaign"].children if "campaign" in data else {}
+    attractions: set[str] = set()
     for study in (campaign[name].to_dataset() for name in studies if name in campaign):
         bare, adhesive = (study["surface_energy"] == 0).any(), (study["surface_energy"] > 0).any()
         several_slopes = len(slopes_of(study)) > 1
@@ -78,10 +79,10 @@ def texts_of(figure: Figure, data: Mapping[str, object], studies: Sequence[str])
             "without a sphere": lacks_sphere(study),
         }
         words += [word for word, holds in conditions.items() if holds]
-    compared = data["model_error"].children.values() if "model_error" in data else ()
-    truths = {node.attrs.get("truth") for node in compared if node.attrs.get("study") in studies}
-    words += ["in the limit"] if SHORT_RANGE in truths else []
-    return "\n".join(words + (["at finite range"] if FINITE_RANGE in truths else []))
+        attractions.update(study["attraction"].values.ravel() if "attraction" in study else ())
+    ranges = {"in the limit": SHORT_RANGE, "at finite range": FINITE_RANGE}
+    present = [word for word, attraction in ranges.items() if attraction in attractions]
+    return "\n".join(words + (["both ranges"] if len(present) > 1 else present))
 
 
 def sentence_on_measurements(measurements: Sequence[Mapping[str, object]]) -> str:

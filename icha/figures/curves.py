@@ -9,7 +9,6 @@ import numpy as np
 
 from icha.contact.models import MODELS, REFERENCE_MODEL
 from icha.datasets.labels import slopes_of
-from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures import select
 from icha.figures.ensembles import draw_members, lines_handles, mark_fewer
 from icha.figures.looks import (
@@ -18,6 +17,7 @@ from icha.figures.looks import (
     CROSSES,
     FEW_LINES,
     MODEL_MARKERS,
+    REFERENCE_NAME,
     TRUTH_LINE,
     Contact,
     Looks,
@@ -97,23 +97,24 @@ def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | Non
     for group in groups:
         look = looks.look(group.contact, applicable=group.applicable) | {"ls": "-" if looks.many else "none"} | changed
         if name != ASPERITIES_NAME:
-            look |= {"marker": cross_look(looks, group.contact)["marker"], "ms": look["ms"] + 2}
+            look |= {"marker": cross_look(looks, group.contact, group.model_name)["marker"], "ms": look["ms"] + 2}
         lines.append(_curve(group, look))
-    crosses = [_curve(truth, cross_look(looks, truth.contact)) for truth in grouped]
+    crosses = [_curve(truth, cross_look(looks, truth.contact, truth.model_name)) for truth in grouped]
     changed |= {"ls": "-" if looks.many or any(len(group.by_seed) > 1 for group in groups) else "none"}
     if len(looks.materials if looks.by_place else looks.places) == 1:
-        changed |= {} if looks.by_place else {"marker": MODEL_MARKERS[name]}
-        handles = looks.handles(**changed) | {name: model_handle(name, **looks.fill())}
-        handles |= {SHORT_RANGE: model_handle(SHORT_RANGE)} if crosses else {}
+        changed |= {} if looks.by_place else {"marker": MODEL_MARKERS[groups[0].model_name]}
+        handles = looks.handles(**changed)
+        handles |= {group.model_name: model_handle(group.model_name, **looks.fill()) for group in groups}
+        handles |= {truth.model_name: model_handle(truth.model_name) for truth in grouped}
     else:
         # A shape shows the model and, for example, the slope. Colours therefore have legend entries without a shape.
         handles = looks.colour_handles()
-        for model, curves in ((name, lines), (SHORT_RANGE, crosses)):
-            for curve in curves:
-                words = f"{model}, {looks.shape_name(curve.runs.contact)}"
-                filled = looks.by_place and curve.look.get("mfc") == curve.look["color"]
-                look = {"mfc": GREY if filled else "white", "marker": curve.look["marker"]}
-                handles.setdefault(words, model_handle(model, **look))
+        for curve in (*lines, *crosses):
+            model = curve.runs.model_name
+            words = f"{model}, {looks.shape_name(curve.runs.contact)}"
+            filled = looks.by_place and curve.look.get("mfc") == curve.look["color"]
+            look = {"mfc": GREY if filled else "white", "marker": curve.look["marker"]}
+            handles.setdefault(words, model_handle(model, **look))
     return Curves(lines, crosses, looks, handles)
 
 
@@ -121,7 +122,7 @@ def _curve(runs, look):
     return Curve(runs, {seed: select.path_steps(run) for seed, run in runs.by_seed.items()}, look)
 
 
-def cross_look(looks: Looks, contact: Contact, model: str = SHORT_RANGE, shape: str | None = None) -> dict:
+def cross_look(looks: Looks, contact: Contact, model: str = REFERENCE_NAME, shape: str | None = None) -> dict:
     """Return arguments of `Axes.plot` for boundary elements: crosses in the colour of the material or surface.
 
     `shape` is the marker of the first surface and slope, if it is not the usual one.
@@ -130,7 +131,7 @@ def cross_look(looks: Looks, contact: Contact, model: str = SHORT_RANGE, shape: 
     # Crosses without adhesion are larger than crosses with adhesion, so that both are visible if they coincide.
     size = (8 if adhesive else 11) * (1 if len(looks.contacts) <= FEW_LINES else 0.7)
     look = {"color": colour, "mec": colour, "ms": size, "zorder": 6 + adhesive}
-    rank = looks.rank(contact) if model == SHORT_RANGE else 0
+    rank = looks.rank(contact) if model == REFERENCE_NAME else 0
     marker = CROSSES[rank % len(CROSSES)] if rank else shape or MODEL_MARKERS[model]
     return look | {"ls": "none", "marker": marker, "mew": 1.0}
 
@@ -162,7 +163,7 @@ def add_snapshot_legend(
     handles = looks.handles(ls="-", marker=MODEL_MARKERS[model])
     handles |= {model: model_handle(model, ls="-", lw=0.8, **looks.fill())}
     if any(line.truths for line in lines):
-        handles[SHORT_RANGE] = model_handle(SHORT_RANGE, **TRUTH_LINE)
+        handles[REFERENCE_NAME] = model_handle(REFERENCE_NAME, **TRUTH_LINE)
     handles |= lines_handles(len(line.members) for line in lines) | named_handles(panels[1:])
     legend_below(figure, handles)
 

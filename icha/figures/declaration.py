@@ -144,7 +144,7 @@ class SnapshotFigure(StudyFigure):
     def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
         """Also yield a problem if the study does not have the snapshot."""
         yield from super().study_problems(campaign, study)
-        snapshots = campaign.snapshots_of(self.study)
+        snapshots = campaign.studies[self.study].saved_states
         if snapshots == []:
             yield ("study",), self.study, "has no snapshot to draw; expected a study with `snapshots`"
         elif self.snapshot is not None and self.snapshot.kind_and_value not in (snapshots or []):
@@ -217,20 +217,14 @@ class RunFigure(TopographyFigure):
 
 
 class ComparedFigure(StudyFigure):
-    """A comparison with boundary elements. The study needs both models, or an entry of `finite_range`."""
+    """A comparison with boundary elements. The study needs both models."""
 
     def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
         """Also yield a problem if the study has no boundary elements at the loads of its asperity runs."""
         yield from super().study_problems(campaign, study)
-        if campaign.compares_models(self.study) or is_solved_at_finite_range(campaign, self.study):
-            return
-        expected = "both `models` and targets `reduced_pressures`, or a study that an entry of `finite_range` names"
-        yield ("study",), self.study, f"has no boundary elements at the same loads; expected a study with {expected}"
-
-
-def is_solved_at_finite_range(campaign: Campaign, study: str) -> bool:
-    """Return True if an entry of `finite_range` requests boundary-element solutions for the runs of a study."""
-    return any(entry.study == study for entry in campaign.finite_range.values())
+        if not campaign.compares_models(self.study):
+            expected = "expected a study with both `models` and targets `reduced_pressures`"
+            yield ("study",), self.study, f"has no boundary elements at the same loads; {expected}"
 
 
 def problems_of_unloading(campaign: Campaign, studies: Mapping[tuple, str]) -> Iterator[Problem]:

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.datasets.variables.model_error import FINITE_RANGE
 from icha.figures.curves import PRESSURE_LABEL
 from icha.figures.ensembles import draw_points, points_handles
 from icha.figures.looks import Contact, Looks, legend_below
-from icha.figures.select import NothingToDraw, asked_of_entry, select_errors
-from icha.figures.style import DASHES, in_style, logarithmic_axes, material_label, new_panels
+from icha.figures.select import NothingToDraw, compared_seeds, select_errors
+from icha.figures.style import in_style, logarithmic_axes, material_label, new_panels
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -52,19 +51,19 @@ def draw_errors(
     named: dict[str, object] = {}
     counts: set[int] = set()
     for row, shown in zip(panels, rows, strict=True):
-        drawn = [(*of, k, entries) for of, entries in curves.items() if of[0][0] in shown for k in range(len(entries))]
+        drawn = [(*of, errors) for of, errors in curves.items() if of[0][0] in shown]
         if own_rows and not looks.adhesive(shown[0]):
             drawn = _different(drawn, list(labels))
-        for position, (contact, applicable, k, entries) in enumerate(drawn):
-            look = looks.look(contact, applicable=applicable) | {"ls": DASHES[k % len(DASHES)]}
-            loads = entries[k]["reduced_pressure"].values * _APART ** (position - (len(drawn) - 1) / 2)
+        for position, (contact, applicable, errors) in enumerate(drawn):
+            look = looks.look(contact, applicable=applicable)
+            loads = errors["reduced_pressure"].values * _APART ** (position - (len(drawn) - 1) / 2)
             for ax, name in zip(row, labels, strict=True):
-                members = (100 if percent else 1) * entries[k][name].values
-                asked = asked_of_entry(entries[k])
+                members = (100 if percent else 1) * errors[name].values
+                asked = compared_seeds(errors)
                 handle = draw_points(ax, loads, members, look, positive=not percent, asked=asked)
                 counts.update(np.isfinite(members).sum(axis=0).tolist())
             if applicable:
-                named.setdefault(_name(looks, contact, entries, k, own_rows=own_rows), handle)
+                named.setdefault(looks.place_name(contact[1:]) if own_rows else looks.name(contact), handle)
         for ax in row if own_rows else ():
             ax.set_title(material_label(interfaces, shown[0]), loc="right", fontsize=8)
     low, high = panels[0, 0].dataLim.intervalx
@@ -84,37 +83,25 @@ def draw_errors(
 def _different(drawn, names):
     """Leave out errors without adhesion that equal those of the same surface at another slope."""
     found = {}
-    for contact, applicable, k, entries in drawn:
-        values = np.concatenate([entries[k][name].values.ravel() for name in names])
+    for contact, applicable, errors in drawn:
+        values = np.concatenate([errors[name].values.ravel() for name in names])
         alike = found.setdefault((contact[1], applicable), [])
         if not any(
             each.shape == values.shape and np.allclose(each, values, rtol=1e-2, equal_nan=True) for each, _ in alike
         ):
-            alike.append((values, (contact, applicable, k, entries)))
+            alike.append((values, (contact, applicable, errors)))
     return [curve for alike in found.values() for _, curve in alike]
 
 
-def _curves(model_error, study, names) -> dict[tuple[Contact, bool], list[xr.Dataset]]:
-    """Return the errors of a study by material, surface and slope, and by applicability of the asperity model.
-
-    A run has several errors if there are boundary elements at several ranges of attraction or on several grids.
-    """
+def _curves(model_error, study, names) -> dict[tuple[Contact, bool], xr.Dataset]:
+    """Return the errors of a study by material, surface and slope, and by applicability of the asperity model."""
     found = {}
     for contact, errors in select_errors(model_error, study):
         for applicable in (True, False):
             runs = (errors["applicability"] == "") == applicable if "applicability" in errors else applicable
             shown = errors.assign({name: errors[name].where(runs) for name in names})
             if any(np.isfinite(shown[name].values).any() for name in names):
-                found.setdefault((contact, applicable), []).append(shown)
+                found[contact, applicable] = shown
     if not found:
         raise NothingToDraw(f"study {study}: no run that was compared with boundary elements is complete")
     return found
-
-
-def _name(looks, contact, entries, k, *, own_rows):
-    """Return a legend name of the errors `entries[k]` that differs from the names of the other entries."""
-    truths = [errors.attrs["truth"] for errors in entries]
-    words = [looks.place_name(contact[1:]) if own_rows else looks.name(contact)]
-    words += ["at finite range"] if len(set(truths)) > 1 and truths[k] == FINITE_RANGE else []
-    words += [entries[k].attrs["entry"]] if truths[k] in truths[:k] else []
-    return ", ".join(filter(None, words))

@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from icha.contact.model import EVENT_KINDS
 from icha.contact.models import MODELS, REFERENCE_MODEL
-from icha.datasets import results
-from icha.datasets.labels import ContactLabels
-from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
 from icha.figures import select
 from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, SEPARATION_LABEL, Axis, physical_units
 from icha.figures.declaration import (
-    Campaign,
     Declaration,
-    Inputs,
     TopographyFigure,
     TruthFigure,
     UnitsFigure,
@@ -43,21 +37,9 @@ class LoopsFigure(UnitsFigure, TruthFigure, TopographyFigure, UnloadedFigure):
     """A figure of the runs of a study in loading and unloading, on one topography."""
 
 
-def inputs(campaign: Campaign, options: LoopsFigure, files: results.ResultFiles) -> Inputs:
-    """Return the paths of the campaign dataset and of files with boundary elements at a finite range, if any."""
-    loops = [
-        files.path(results.LOOP, ContactLabels(label, *contact))
-        for label, entry in campaign.boundary_element_loops.items()
-        if entry.study == options.study
-        for contact in campaign.contacts_beside(entry)
-    ]
-    return {"campaign": files.path(results.DATASET)} | ({"loops": loops} if loops else {})
-
-
 DECLARATION = Declaration(
     description="Pressure against mean separation and contact area against load, in loading and unloading.",
     options=LoopsFigure,
-    inputs=inputs,
 )
 
 # All slopes share a panel if there are at most this number of loops.
@@ -100,7 +82,6 @@ class _Loop(NamedTuple):
 @in_style
 def figure(
     campaign: xr.DataTree,
-    loops: Sequence[xr.Dataset] = (),
     *,
     study: str,
     boundary_elements: str | None = None,
@@ -113,8 +94,6 @@ def figure(
     Parameters
     ----------
     campaign : the campaign dataset.
-    loops : datasets of loading and unloading with boundary elements at finite ranges, if there are any. Only loops on
-        the topography of the figure are shown.
     surface, seed : labels of the topography. Default: surface and seed of the first complete run.
     units : "reduced" or "physical".
     """
@@ -125,7 +104,7 @@ def figure(
     runs = select.select_by_labels(select.select_unloaded_runs(campaign, study), surface=surface, seed=seed)
     others = select.select_runs(campaign, boundary_elements or study, ragged=False, model=REFERENCE_MODEL)
     shown = {labels for labels, _ in runs}
-    truths = [*(run for labels, run in others if labels not in shown and select.unloading_legs(run)), *loops]
+    truths = [run for labels, run in others if labels not in shown and select.unloading_legs(run)]
     slopes = sorted({labels.rms_slope for labels, _ in runs}, reverse=True)
     own_rows = len(runs) > _MOST_LOOPS and 1 < len(slopes) < len(runs)
     # Slopes that have their own panels need no markers.
@@ -183,10 +162,8 @@ def figure(
 def _in_units(run, pressure, separation):
     """Return a run with the variables `load` and `separation`, reduced values times two factors, and their `slope`."""
     load, apart = run["reduced_pressure"] * pressure, run["reduced_separation"] * separation
-    run = run.assign(load=load, separation=apart)
-    if "contact_stiffness" not in run:  # boundary elements at a finite range are drawn as separate states
-        return run
     unit = run["contact_modulus"] * run["unit_slope"] / run["unit_height"]
+    run = run.assign(load=load, separation=apart)
     return run.assign(slope=-run["contact_stiffness"] / unit * pressure / separation)
 
 
@@ -204,7 +181,7 @@ def _draw(ax, loop, names, *, turn):
     for truth in loop.truths:
         for branch, markers in _TRUTH_MARKERS.items():
             states = truth.isel(step=truth["branch"].values == branch)
-            look = {"color": colour, "marker": markers[_truth_name(truth)], **_TRUTH}
+            look = {"color": colour, "marker": markers[select.name_of_model(truth)], **_TRUTH}
             # The colour is already pale if the asperity model is not applicable.
             look = look if select.is_good_loop(truth) or "label" in loop.look else pale(look, REFERENCE_MODEL)
             ax.plot(*(states[name] for name in names), markevery=_APART, **look)
@@ -250,12 +227,7 @@ def _handles(looks, loops, *, marked):
         handles[branch] = legend_handle(color=GREY, ls=dashes, **_BRANCHES[branch])
     if any(select.pull_off_step(loop.run) is not None for loop in loops):
         handles["pull-off"] = legend_handle(marker="o", mfc=GREY, **_PULL_OFF)
-    for name in dict.fromkeys(_truth_name(truth) for loop in loops for truth in loop.truths):
+    for name in dict.fromkeys(select.name_of_model(truth) for loop in loops for truth in loop.truths):
         for branch, markers in _TRUTH_MARKERS.items():
             handles[f"{name}, {branch}"] = legend_handle(color=GREY, marker=markers[name], **_TRUTH)
     return handles
-
-
-def _truth_name(truth):
-    """Return the legend name of boundary elements, in the limit of a short range or at a finite range."""
-    return SHORT_RANGE if truth.attrs.get("contact_model") == REFERENCE_MODEL else FINITE_RANGE

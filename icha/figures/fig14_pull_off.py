@@ -10,12 +10,12 @@ import numpy as np
 from pydantic import Field
 
 from icha.contact.models import REFERENCE_MODEL
-from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.curves import cross_look, drop_rounding_errors
 from icha.figures.declaration import Campaign, Declaration, StudyFigure, problems_of_unloading
 from icha.figures.ensembles import Points, points_handles
 from icha.figures.looks import (
     ASPERITIES_NAME,
+    REFERENCE_NAME,
     TRUTH_LINE,
     UNLOADING_MARKERS,
     legend_below,
@@ -60,7 +60,7 @@ _SPAN, _SPAN_WITH_ZEROS = 5.0, 30.0
 _LINE = {"lw": 0.9, "ls": "-"}
 _TRUTH = {name: TRUTH_LINE[name] for name in ("lw", "ls")}
 # Oblique crosses can be told from bars.
-_OBLIQUE = UNLOADING_MARKERS[SHORT_RANGE]
+_OBLIQUE = UNLOADING_MARKERS[REFERENCE_NAME]
 # Points at the same slope or load are drawn side by side. The last and the first of many lines have nearly this ratio.
 _SPREAD = 1.15
 # Size of the markers, divided by the usual size, so that short bars are visible.
@@ -116,8 +116,8 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
         crossed = [contact for contact, _, model in (*by_slope, *by_load) if model == REFERENCE_MODEL]
         for contact in crossed:
             look = {"marker": cross_look(looks, contact, shape=_OBLIQUE)["marker"]}
-            words = [SHORT_RANGE, *([looks.shape_name(contact)] if any(map(looks.rank, crossed)) else [])]
-            handles[", ".join(words)] = model_handle(SHORT_RANGE, **look | _TRUTH)
+            words = [REFERENCE_NAME, *([looks.shape_name(contact)] if any(map(looks.rank, crossed)) else [])]
+            handles[", ".join(words)] = model_handle(REFERENCE_NAME, **look | _TRUTH)
     title = [models[0] if len(models) == 1 else None, looks.heading()]
     panels[0].set_title(", ".join(filter(None, title)), loc="right", fontsize=8)
     legend_below(fig, handles | points_handles(counts))

@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.contact.models import REFERENCE_MODEL
-from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.curves import cross_look
 from icha.figures.declaration import Campaign, Declaration, FigureOptions, problems_of_unloading
 from icha.figures.ensembles import Points, points_handles
-from icha.figures.looks import legend_below, looks_of_studies, model_handle, pale
+from icha.figures.looks import REFERENCE_NAME, legend_below, looks_of_studies, model_handle, pale
 from icha.figures.select import ContactRuns, NothingToDraw, names_of_models, select_detached_lines
 from icha.figures.style import GREY, in_style, logarithmic_axes, new_panels
 from icha.support.values import Problem, list_of_names
@@ -82,7 +81,7 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
     fig, [(loss, parts)] = new_panels(3.1, width_ratios=(1.25, 1))
     handles, counts = _draw_losses(loss, sticky, truths, looks)
     if truths:
-        handles |= {SHORT_RANGE: model_handle(SHORT_RANGE)}
+        handles |= {REFERENCE_NAME: model_handle(REFERENCE_NAME)}
     else:
         loss.set_title(", ".join(names_of_models(itertools.chain(*sticky.values()))), loc="right")
     shown = _draw_parts(parts, sticky, looks)

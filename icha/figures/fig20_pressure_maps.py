@@ -31,7 +31,7 @@ class MapsFigure(RunFigure):
         if REFERENCE_MODEL not in study.models:
             expected = f"expected a study with {REFERENCE_MODEL!r} among its `models`"
             yield ("study",), self.study, f"has no runs with boundary elements; {expected}"
-        if campaign.snapshots_of(self.study) == []:
+        if campaign.studies[self.study].saved_states == []:
             yield ("study",), self.study, "has no snapshot to draw; expected a study with `snapshots`"
 
     def run(self, campaign: Campaign) -> RunLabels:

@@ -6,36 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.contact.models import REFERENCE_MODEL
-from icha.datasets import results
-from icha.datasets.labels import RunLabels
-from icha.datasets.variables.model_error import FINITE_RANGE
 from icha.figures import curves
-from icha.figures.declaration import (
-    Campaign,
-    Declaration,
-    Inputs,
-    StudyFigure,
-    UnitsFigure,
-    dataset_and_theories,
-    is_solved_at_finite_range,
-)
+from icha.figures.declaration import Declaration, StudyFigure, UnitsFigure, dataset_and_theories
 from icha.figures.ensembles import draw_members
-from icha.figures.looks import model_handle
-from icha.figures.select import ContactRuns, asked_of_entry, select_errors
 from icha.figures.style import BLACK, GREY, in_style, logarithmic_axes, new_panels
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
-
-
-def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles) -> Inputs:
-    """Return the paths of dataset, theories and, if the study has solutions at a finite range, model error."""
-    found = dataset_and_theories(campaign, options, files)
-    if is_solved_at_finite_range(campaign, options.study):
-        found["model_error"] = files.path(results.MODEL_ERROR)
-    return found
 
 
 class AreaAndGapFigure(UnitsFigure, StudyFigure):
@@ -45,7 +23,7 @@ class AreaAndGapFigure(UnitsFigure, StudyFigure):
 DECLARATION = Declaration(
     description="Contact area and mean separation against load, with theories, and differences between the models.",
     options=AreaAndGapFigure,
-    inputs=inputs,
+    inputs=dataset_and_theories,
 )
 
 # Height of the lower panels divided by the height of the upper panels. The lower panels show differences.
@@ -64,7 +42,6 @@ _QUANTITIES = ((curves.area_points, "A"), (curves.gap_points, r"\bar{u}"))
 def figure(
     campaign: xr.DataTree,
     references: xr.Dataset | None = None,
-    model_error: xr.DataTree | None = None,
     *,
     study: str,
     units: str = "reduced",
@@ -75,17 +52,12 @@ def figure(
     ----------
     campaign : the campaign dataset.
     references : theories and published results for the study's first surface (`icha.references.theories`), if any.
-    model_error : values of boundary elements at a finite range (`icha.analysis.model_error.model_error`), if any.
     units : "reduced" or "physical".
     """
     if units == "physical":
         return _in_physical_units(campaign, study, references)
     shown, dataset = curves.study_curves(campaign, study), campaign[study].to_dataset()
-    if solved := _finite_range_curves(model_error, study, shown.looks):
-        shown.crosses.extend(solved)
-        shown.handles[FINITE_RANGE] = model_handle(FINITE_RANGE, ms=8)
-    # Solutions in the limit of a short range are preferred: solutions at a finite range are only bounds of this limit.
-    truths = {truth.runs.contact: truth for truth in reversed(shown.crosses)}
+    truths = {truth.runs.contact: truth for truth in shown.crosses}
     compared = [(line, truths[line.runs.contact]) for line in shown.lines if line.runs.contact in truths]
     fig, axes = new_panels(4.5, 2, sharex=True, height_ratios=(1, _LOWER)) if compared else new_panels(3.3)
     left, right = axes[0]
@@ -115,9 +87,7 @@ def figure(
         ax.axhline(0, color="0.6", lw=0.6, zorder=0)
         ax.set_ylabel(rf"${symbol}/{symbol}_{{\mathrm{{BEM}}}}-1$  (%)")
     if compared:
-        # Solutions at a finite range are single states, and not runs.
-        runs = [(line, truth) for line, truth in compared if "leg" in next(iter(truth.runs.by_seed.values()))]
-        _draw_estimates(axes[1], shown, runs)
+        _draw_estimates(axes[1], shown, compared)
     for ax in axes[-1]:
         ax.set(xlim=x, xlabel=curves.PRESSURE_LABEL)
     curves.add_legend(fig, [left, right, *axes[1:].ravel()], shown)
@@ -155,22 +125,6 @@ def _in_physical_units(campaign, study, references):
     right.set_ylabel(gap.label)
     curves.add_legend(fig, [left, right], shown)
     return fig
-
-
-def _finite_range_curves(model_error, study, looks):
-    """Return the curves of boundary elements at a finite range from the dataset `model_error`."""
-    found = []
-    for contact, errors in select_errors(model_error, study):
-        material, surface, slope = contact
-        states = errors[[f"{name}_boundary_elements" for name in ("contact_area_fraction", "reduced_separation")]]
-        states = states.rename({name: name.removesuffix("_boundary_elements") for name in states})
-        by_seed = {seed: states.sel(seed=seed).dropna("reduced_pressure") for seed in errors["seed"].values.tolist()}
-        by_seed = {seed: states for seed, states in by_seed.items() if states["reduced_pressure"].size}
-        if by_seed and errors.attrs["truth"] == FINITE_RANGE:
-            labels = RunLabels(study, REFERENCE_MODEL, surface, next(iter(by_seed)), slope, material)
-            runs = ContactRuns(labels, by_seed, asked_of_entry(errors), True)
-            found.append(curves.Curve(runs, by_seed, curves.cross_look(looks, contact, FINITE_RANGE)))
-    return found
 
 
 def _difference(line, truth, points):

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.datasets.variables.model_error import SHORT_RANGE
+from icha.contact.attraction import FINITE_RANGE
 from icha.figures.curves import add_snapshot_legend, drop_rounding_errors, snapshot_looks
 from icha.figures.declaration import Declaration, SnapshotFigure
 from icha.figures.ensembles import draw_members, join_bins
-from icha.figures.looks import MODEL_MARKERS, TRUTH_LINE
+from icha.figures.looks import MODEL_MARKERS, REFERENCE_NAME, TRUTH_LINE
 from icha.figures.select import select_snapshots
 from icha.figures.style import BLACK, GREY, in_style, logarithmic_axes, new_panels
 
@@ -58,7 +58,7 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
             continue
         beside = ((left, *gap_densities(line.truths)), (right, *pressure_densities(line.truths, joined=True)))
         for ax, at, densities in beside:
-            dashed = TRUTH_LINE | {"color": look["color"], "marker": MODEL_MARKERS[SHORT_RANGE]}
+            dashed = TRUTH_LINE | {"color": look["color"], "marker": MODEL_MARKERS[REFERENCE_NAME]}
             ax.plot(at, densities.mean(axis=0), markevery=1 + len(at) // _BESIDE_MARKERS, **dashed)
             top = densities.mean(axis=0).max(initial=top) if ax is right else top
         tails.append((line.truths, look["color"]))
@@ -97,12 +97,12 @@ def singular_tail(members: Sequence[tuple[xr.Dataset, int]], lowest: float) -> t
 
     At a distance x from the edge of contact, the tension is K_c/sqrt(2 pi x), with K_c^2 = 2 E* dgamma. With the
     length L of the edge, the density is P(p) = L K_c^2/(pi |p|^3 A0). The tail begins at the largest tension that the
-    grid resolves, and ends at the pressure `lowest`. Without adhesion, the tail is empty.
+    grid resolves, and ends at the pressure `lowest`. The tail is empty without adhesion and at a finite range.
     """
     (run, _), *_ = members
     unit = float(run["contact_modulus"]) * float(run["unit_slope"])
     first = -float(run["resolved_tension"]) / unit
-    if not lowest < first < 0:
+    if not lowest < first < 0 or run.attrs.get("attraction") == FINITE_RANGE:
         return np.empty(0), np.empty(0)
     edge = np.mean([float(run["spot_perimeter"][run["spot_snapshot"] == at].sum()) for run, at in members])
     intensity = 2 * float(run["contact_modulus"]) * float(run["surface_energy"]) / (np.pi * float(run["period"]) ** 2)

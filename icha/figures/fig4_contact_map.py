@@ -10,9 +10,8 @@ import numpy as np
 from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
 from icha.datasets import results
 from icha.datasets.labels import RunLabels
-from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.declaration import Campaign, Declaration, Inputs, RunFigure, SnapshotFigure
-from icha.figures.looks import NOT_APPLICABLE_ALONE, run_label
+from icha.figures.looks import NOT_APPLICABLE_ALONE, REFERENCE_NAME, run_label
 from icha.figures.maps import draw_map, draw_spots, topography_of, wrap_circles
 from icha.figures.select import is_applicable, select_complete_run
 from icha.figures.style import BLUE, format_number, in_style, legend_handle, new_panels
@@ -161,7 +160,7 @@ def _draw_boundary_elements(panels, topography, window, heights, beside, covered
     draw_map(compared, palette[1 * covered + 2 * contact], topography.side)
     keys = [Patch(fc=colour, label=name) for name, colour in _STATES if name]
     compared.legend(handles=keys, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=3, columnspacing=1.0)
-    solution.set_title(rf"{SHORT_RANGE}, $A/A_0$ = {float(beside['contact_area_fraction']):.3f}", loc="right")
+    solution.set_title(rf"{REFERENCE_NAME}, $A/A_0$ = {float(beside['contact_area_fraction']):.3f}", loc="right")
     compared.set_title(f"overlap (both / at least one) {jaccard(covered, contact):.2f}", loc="right")
 
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from icha.datasets import results
-from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.curves import (
     AREA_LABEL,
     PRESSURE_LABEL,
@@ -21,7 +20,7 @@ from icha.figures.curves import (
     study_curves,
 )
 from icha.figures.declaration import Campaign, Declaration, Inputs, TruthFigure
-from icha.figures.looks import ASPERITIES_NAME, MODEL_MARKERS, TRUTH_LINE, model_handle, surface_label
+from icha.figures.looks import ASPERITIES_NAME, MODEL_MARKERS, REFERENCE_NAME, TRUTH_LINE, model_handle, surface_label
 from icha.figures.select import has_shape
 from icha.figures.style import DASHES, in_style, new_panels
 from icha.support.tables import read_columns
@@ -132,9 +131,9 @@ def figure(
 
 def _with_one_shape_per_model(curves):
     """Return curves whose boundary elements all are upright crosses with a dashed line; the legend names the models."""
-    shape = {"marker": MODEL_MARKERS[SHORT_RANGE], "ls": TRUTH_LINE["ls"], "lw": 0.6}
+    shape = {"marker": MODEL_MARKERS[REFERENCE_NAME], "ls": TRUTH_LINE["ls"], "lw": 0.6}
     handles = {ASPERITIES_NAME: model_handle(ASPERITIES_NAME, **{"ls": "-", "lw": 0.9} | curves.looks.fill())}
-    handles = curves.looks.colour_handles() | handles | {SHORT_RANGE: model_handle(SHORT_RANGE, **shape)}
+    handles = curves.looks.colour_handles() | handles | {REFERENCE_NAME: model_handle(REFERENCE_NAME, **shape)}
     return curves._replace(crosses=[each._replace(look=each.look | shape) for each in curves.crosses], handles=handles)
 
 

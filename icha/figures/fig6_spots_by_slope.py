@@ -28,7 +28,7 @@ class SlopesFigure(TopographyFigure):
     def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
         """Also yield a problem if the study does not have snapshots of both kinds."""
         yield from super().study_problems(campaign, study)
-        kinds = [kind for kind, _ in campaign.snapshots_of(self.study) or []]
+        kinds = [kind for kind, _ in campaign.studies[self.study].saved_states or []]
         for kind in ("relative_load", "area_fraction"):
             if kind not in kinds:
                 yield ("study",), self.study, f"has no snapshot of kind {kind}; expected a study with such a snapshot"

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.curves import add_snapshot_legend, snapshot_looks
 from icha.figures.declaration import Declaration, SnapshotFigure
 from icha.figures.ensembles import draw_members, join_bins
-from icha.figures.looks import MODEL_MARKERS, TRUTH_LINE
+from icha.figures.looks import MODEL_MARKERS, REFERENCE_NAME, TRUTH_LINE
 from icha.figures.select import select_snapshots
 from icha.figures.style import TWO_COLUMNS, in_style, logarithmic_axes, new_panels
 from icha.support.formatting import choose_unit
@@ -52,7 +51,7 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
     fig, [panels] = new_panels(3.1, columns=1 + dense, width=TWO_COLUMNS if dense else _ALONE, sharex=True)
     for line, look, (own, true) in zip(lines, each_look, areas, strict=True):
         smooth = look | {"marker": "none", "lw": 1.4 * look["lw"]}
-        drawn = [(patch_density, look, MODEL_MARKERS[SHORT_RANGE]), (patches_above, smooth, "none")]
+        drawn = [(patch_density, look, MODEL_MARKERS[REFERENCE_NAME]), (patches_above, smooth, "none")]
         for ax, (points, line_look, marker) in zip(panels, drawn[-len(panels) :], strict=True):
             draw_members(ax, *points(own, cell), line_look, positive=True, asked=line.runs.asked)
             if true:

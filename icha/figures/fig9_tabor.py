@@ -1,4 +1,4 @@
-"""Fig. 9: contact area and mean separation against the Tabor parameter, at one load."""
+"""Fig. 9: contact at one load, or pull-off of a sphere, against the Tabor parameter."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from icha.contact.attraction import FINITE_RANGE, SHORT_RANGE
 from icha.figures.curves import AREA_LABEL, gap_label
 from icha.figures.declaration import Declaration, SnapshotFigure
 from icha.figures.ensembles import Points, points_handles
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 DECLARATION = Declaration(
     description=(
         "Contact area and mean separation against the Tabor parameter, for studies whose materials differ in "
-        "`interaction_range`."
+        "`interaction_range`. For smooth spheres that are pulled off: pull-off force and loss."
     ),
     options=SnapshotFigure,
 )
@@ -33,11 +34,17 @@ _STATE = ("contact_area_fraction", "reduced_separation")
 
 @in_style
 def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target: float | None = None) -> Figure:
-    """Draw contact area and mean separation at one snapshot against the Tabor parameter, for all runs of a study."""
+    """Draw contact area and mean separation at one snapshot against the Tabor parameter, for all runs of a study.
+
+    For smooth spheres that are pulled off, draw the pull-off force and the loss instead.
+    """
     from icha.analysis.model_error import state_of
     from icha.datasets.campaign import find_snapshot
 
-    groups = group_by_contact(campaign, select_runs(campaign, study, ragged=False))
+    runs = select_runs(campaign, study, ragged=False)
+    if all(float(run.get("pull_off_force_over_jkr", 0)) and run["short_wavelength"] == np.inf for _, run in runs):
+        return _pull_off_of_spheres([run for _, run in runs])
+    groups = group_by_contact(campaign, runs)
     run = next(iter(groups[-1].by_seed.values()))
     shown = snapshot_label(run, find_snapshot(run, kind, target))
     # Materials that differ only in the range of attraction form one line with the name of the first material.
@@ -81,6 +88,39 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
     panels[0].set_title(shown, loc="right")
     legend_below(fig, looks.handles() | named_handles(panels) | points_handles(counts))
     return fig
+
+
+def _pull_off_of_spheres(runs):
+    """Draw pull-off force and loss of smooth spheres against the Tabor parameter, with the limits of JKR and DMT."""
+    from icha.asperity.tabor import sphere_pull_off_factor
+
+    runs = sorted(runs, key=lambda run: float(run["tabor_parameter"]))
+    tabor, pull_off, loss = np.array([_values_of_sphere(run) for run in runs]).T
+    resolved = np.array([run.attrs.get("attraction") == FINITE_RANGE for run in runs])
+    fig, [panels] = new_panels(3.1)
+    for ax, values in zip(panels, (pull_off, loss), strict=True):
+        ax.plot(tabor, values, color=GREY, lw=0.6, zorder=1)
+        for chosen, fill, label in ((resolved, "C0", FINITE_RANGE), (~resolved, "white", SHORT_RANGE)):
+            if chosen.any():
+                ax.plot(tabor[chosen], values[chosen], "o", ms=4.5, mec="C0", mfc=fill, label=label)
+        logarithmic_axes(ax, "x")
+        ax.set_xlabel(r"Tabor parameter  $\mu$")
+    at = np.geomspace(tabor.min(), tabor.max(), 200)
+    panels[0].plot(at, sphere_pull_off_factor(at), color="0.3", lw=1, label="theory of Maugis")
+    for limit, name, style in ((1.5, "JKR", (0, (5, 2))), (2.0, "DMT", ":")):
+        panels[0].axhline(limit, color="0.3", lw=0.9, ls=style, label=name)
+    panels[0].set(ylabel=r"pull-off force$\,/\,\pi\Delta\gamma R$", ylim=(1.4, 2.1))
+    panels[1].set_ylabel(r"loss$\,/\,(\Delta\gamma^5 R^4/E^{*2})^{1/3}$")
+    legend_below(fig, named_handles(panels))
+    return fig
+
+
+def _values_of_sphere(run):
+    """Return Tabor parameter, pull-off force over pi dgamma R, and loss over (dgamma^5 R^4/E*^2)^(1/3)."""
+    energy, R, modulus = (float(run[name]) for name in ("surface_energy", "shape_radius", "contact_modulus"))
+    loss = float(run["hysteresis_loss"]) * float(run["period"]) ** 2
+    unit = np.cbrt(energy**5 * R**4 / modulus**2)
+    return float(run["tabor_parameter"]), float(run["pull_off_force"]) / (np.pi * energy * R), loss / unit
 
 
 def _finish(ax, smallest):

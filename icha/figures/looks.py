@@ -16,7 +16,7 @@ import numpy as np
 
 from icha.contact.models import DEFAULT_MODEL, MODELS, REFERENCE_MODEL
 from icha.datasets.labels import RunLabels, slopes_of
-from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
+from icha.figures.select import FINITE_RANGE_NAME
 from icha.figures.style import BLACK, COLOURS, GREY, INTERFACE, legend_handle, material_label, slope_label
 from icha.support.formatting import format_quantity
 
@@ -33,12 +33,12 @@ Contact = tuple[str, str, float | None]
 MATERIAL_COLOURS = (*COLOURS[:-1], "#004166", "#803800", "#005A42", "#80436A", "#805800", "#2B6C94")
 MARKERS = ("o", "s", "^", "D", "v", "p", "*")
 
-ASPERITIES_NAME = MODELS["asperities"].words
+ASPERITIES_NAME, REFERENCE_NAME = MODELS[DEFAULT_MODEL].words, MODELS[REFERENCE_MODEL].words
 # Crosses of boundary elements for the second and further surfaces or slopes; the first one has four arms.
 CROSSES = ((4, 2, 0), (5, 2, 0), (6, 2, 0), (8, 2, 0))
 # Markers in legends by the name of the model.
-MODEL_MARKERS = {ASPERITIES_NAME: "o", SHORT_RANGE: "+", FINITE_RANGE: "1"}
-UNLOADING_MARKERS = {SHORT_RANGE: "x", FINITE_RANGE: "2"}
+MODEL_MARKERS = {ASPERITIES_NAME: "o", REFERENCE_NAME: "+", FINITE_RANGE_NAME: "1"}
+UNLOADING_MARKERS = {REFERENCE_NAME: "x", FINITE_RANGE_NAME: "2"}
 BRANCH_DASHES = {"loading": "-", "unloading": (0, (4, 2))}
 # Look of lines of boundary elements in figures that also have lines of the asperity model.
 TRUTH_LINE = {"ls": (0, (3, 2)), "lw": 0.8, "ms": 5, "mew": 0.8, "zorder": 5}

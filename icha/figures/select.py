@@ -8,13 +8,23 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from icha.contact.models import MODELS, REFERENCE_MODEL, first_model
+from icha.contact.attraction import FINITE_RANGE
+from icha.contact.models import MODELS, REFERENCE_MODEL, first_model, model_of
 from icha.datasets.labels import LABELS, RunLabels, place_of, surfaces_and_slopes
 from icha.figures.style import format_number
 from icha.path.targets import UNLOADING
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+# Name of boundary elements at a finite range of attraction in legends; other names are in the records of the models.
+FINITE_RANGE_NAME = "boundary elements at finite range"
+
+
+def name_of_model(run: xr.Dataset) -> str:
+    """Return the name of the model of a run in legends."""
+    return FINITE_RANGE_NAME if run.attrs.get("attraction") == FINITE_RANGE else model_of(run.attrs).words
 
 
 class NothingToDraw(ValueError):
@@ -43,6 +53,11 @@ class ContactRuns(NamedTuple):
     def contact(self) -> tuple[str, str, float]:
         """Material, surface and rms slope."""
         return self.labels.material, self.labels.surface, self.labels.rms_slope
+
+    @property
+    def model_name(self) -> str:
+        """Name of the model in legends."""
+        return name_of_model(next(iter(self.by_seed.values())))
 
     @property
     def surface_energy(self) -> float:
@@ -251,28 +266,27 @@ def snapshot_label(run: xr.Dataset, snapshot: int) -> str:
     return f"{branch}{_KIND_LABELS[kind.removeprefix(UNLOADING)]} = {format_number(value)}"
 
 
-def select_errors(model_error: xr.DataTree | None, study: str) -> Iterator[tuple[tuple[str, str, float], xr.Dataset]]:
-    """Yield the model errors of a study along seeds and loads, for each entry, material, surface and slope.
+def select_errors(model_error: xr.DataTree, study: str) -> Iterator[tuple[tuple[str, str, float], xr.Dataset]]:
+    """Yield the model errors of a study along seeds and loads, for each material, surface and slope.
 
     Parameters
     ----------
-    model_error : dataset of `icha.analysis.model_error.model_error`; None without boundary elements.
+    model_error : dataset of `icha.analysis.model_error.model_error`.
 
     Yields
     ------
-    Material, surface and rms slope; and the dataset of the errors, with NaN if the entry lacks this combination.
+    Material, surface and rms slope; and the dataset of the errors, with NaN if the study lacks this combination.
     """
-    for node in model_error.children.values() if model_error is not None else ():
-        if node.attrs["study"] != study:
-            continue
-        errors = node.to_dataset().transpose("seed", ...)
-        for material, (surface, slope) in itertools.product(errors["material"].values, surfaces_and_slopes(errors)):
-            labels = {"surface": surface, "rms_slope": slope, "material": material}
-            yield (str(material), surface, slope), errors.isel(place_of(errors, labels))
+    if study not in model_error.children:
+        return
+    errors = model_error[study].to_dataset().transpose("seed", ...)
+    for material, (surface, slope) in itertools.product(errors["material"].values, surfaces_and_slopes(errors)):
+        labels = {"surface": surface, "rms_slope": slope, "material": material}
+        yield (str(material), surface, slope), errors.isel(place_of(errors, labels))
 
 
-def asked_of_entry(errors: xr.Dataset) -> int:
-    """Return the number of seeds that an entry requests; `errors` is one dataset of `select_errors`."""
+def compared_seeds(errors: xr.Dataset) -> int:
+    """Return the number of seeds that a comparison requests; `errors` is one dataset of `select_errors`."""
     from icha.datasets.variables.campaign import NOT_IN_DESIGN
 
     return int((errors["status"] != NOT_IN_DESIGN).sum("seed"))

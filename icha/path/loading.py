@@ -157,8 +157,9 @@ def first_loading(
 ) -> Iterator[Waypoint]:
     """Follow a path that ends with the first loading, and yield a waypoint for every target.
 
-    If a target is expected within the next step, the solver looks directly for the state at this target. If this fails
-    and the target is far, the path goes a part of the distance and tries once more. In all other cases the separation
+    If a target is expected within the next step, the solver looks directly for the state at this target. If every load
+    has only one equilibrium, it does so at any distance. If this fails and the target is far, the path goes a part of
+    the distance and tries once more. In all other cases the separation
     decreases by one step, at most `longest`, m; a target within this step is found by `find_first_target`. The step is
     halved if there is no equilibrium at its end. If a target lies inside a jump, the path goes on from the state before
     the jump, and the error is raised after the last target. Raise the errors of `icha.path.follow.follow`.
@@ -173,9 +174,10 @@ def first_loading(
         expected, nearest = max(((each.predict_separation(state), each) for each in following), key=itemgetter(0))
         distance = state.separation - expected
         try:
-            if distance <= step and failed_trials < _DIRECT_ATTEMPTS:
+            reach = np.inf if contact.is_unique else step
+            if distance <= reach and failed_trials < _DIRECT_ATTEMPTS:
                 target = nearest
-                after = _solve_within_step(nearest, expected, following, state, step)
+                after = _solve_within_step(nearest, expected, following, state, reach)
                 if after is None:
                     # Next try a shorter step. After a second failed attempt, two states bracket the target.
                     failed_trials = failed_trials + 1 if distance > _LONG * longest else _DIRECT_ATTEMPTS

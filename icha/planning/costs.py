@@ -78,10 +78,6 @@ LAWS = {
     "boundary_elements, adhesion": PowerLaw(0.14, 1.5e-3, {"nodes": 0.35, "stops": 0.55, "spots": 0.71}),
     "boundary_elements, cycle": PowerLaw(0.25, 6e-6, {"nodes": 1.25}),
     "boundary_elements, adhesion, cycle": PowerLaw(0.6, 1.4e-4, {"nodes": 1}),
-    "finite range": PowerLaw(0, 7.9e-8, {"nodes": 1.55, "load": 0.3}),
-    "finite range, adhesion": PowerLaw(0, 1.2e-8, {"nodes": 1.56, "load": -0.5}),
-    "finite range, cycle": PowerLaw(0, 2.8e-7, {"nodes": 1.72, "step": -0.1}),
-    "finite range, adhesion, cycle": PowerLaw(0, 1.4e-6, {"nodes": 1.72, "step": -0.1}),
     "reference": PowerLaw(0.28, 0, {}),
     "campaign_dataset": PowerLaw(0.07, 0.015, {"runs": 1}),
     "table": PowerLaw(0.1, 0.008, {"runs": 1}),
@@ -169,7 +165,7 @@ RUN_SIZES = {
     "asperities": RunSize(arrays=1, summit=9 * 1024),
     # Measured time, divided by the time at U_full/dgamma = 7: 1.5 at 1.8, 4.3 at 0.72, and up to 21 at 0.14. Time of
     # loops, divided by the time at 100: 2 at 15, 6 at 3.2.
-    "boundary_elements": RunSize(arrays=20, maps=8.0, sticky=3.0, sticky_cycle=20.0, minutes=(240, 960, 1440), free=4),
+    "boundary_elements": RunSize(arrays=45, maps=8.0, sticky=3.0, sticky_cycle=20.0, minutes=(240, 960, 1440), free=4),
 }
 
 
@@ -225,15 +221,6 @@ def run_cost(
     values = 20e3 + 57 * most * max(snapshots, 1) + 160 * steps + 20e3 * bool(legs)
     # Names and attributes in a file take 53 kB.
     return Cost(seconds, memory, 53e3 + values + size.maps * nodes * snapshots, values)
-
-
-def finite_range_cost(nodes: int, *, adhesive: bool, **quantity: float) -> Cost:
-    """Return the expected cost of boundary elements at a finite range, on a grid of `nodes` x `nodes` nodes.
-
-    One keyword is needed: `load` (reduced pressure) for a solution, or `step` (of the mean gap, h_rms) for a loop.
-    """
-    seconds = _law("finite range", adhesive=adhesive, cycle="step" in quantity).seconds(nodes=nodes**2, **quantity)
-    return Cost(seconds, WORKFLOW.forked + 20 * _DOUBLE * nodes**2, 40e3 + 0.04 * nodes**2)
 
 
 # Memory that a job needs for the values of runs: bytes for each byte in `values`, up to a limit in bytes. The limit

@@ -128,7 +128,7 @@ def _state(results, path):
 
 
 def _computed_files(campaign, results, files, sha256_of_run) -> Iterator[Item]:
-    """Yield the files of surfaces, runs, theories and boundary-element solutions at a finite range."""
+    """Yield the files of surfaces, runs, and theories."""
     run_cost = cache(costs.run_cost)
 
     @cache
@@ -156,22 +156,6 @@ def _computed_files(campaign, results, files, sha256_of_run) -> Iterator[Item]:
     for path in files.theories:
         cost = costs.derived_cost("reference", 0, 35e3)
         yield Item("theories", "reference", path, _state(results, path), cost)
-    for path, solution in files.solutions.items():
-        load = {"load": solution.reduced_pressure}
-        yield _finite_range(campaign, results, path, campaign.finite_range[solution.entry], solution, load)
-    for path, loop in files.loops.items():
-        entry = campaign.boundary_element_loops[loop.entry]
-        yield _finite_range(campaign, results, path, entry, loop, {"step": entry.separation_step})
-
-
-def _finite_range(campaign, results, path, entry, case, quantity) -> Item:
-    """Return the `Item` of a solution or loop of boundary elements at a finite range."""
-    adhesive = campaign.materials[case.material].surface_energy > 0
-    cost = costs.finite_range_cost(campaign.grid(case.surface) * entry.refinement, adhesive=adhesive, **quantity)
-    part, rule = "boundary elements", "boundary_elements"
-    if "step" in quantity:
-        part, rule = f"{part}, cycle", "boundary_element_loop"
-    return Item(f"{part} {case.entry}", rule, path, _state(results, path), cost)
 
 
 def _derived_files(campaign, files: CampaignFiles, computed: list[Item]) -> Iterator[tuple]:
@@ -179,15 +163,14 @@ def _derived_files(campaign, files: CampaignFiles, computed: list[Item]) -> Iter
     runs, cost = len(files.runs), costs.derived_cost
     disk = sum(item.cost.disk for item in computed if item.is_run)
     values = sum(item.cost.values for item in computed)
-    beside = [*files.compared, *files.solutions]
     tables = [
         ("campaign_dataset", [files.dataset], 1, files.runs, runs, 0.5 * disk),
         ("table", [files.table], 2, [files.dataset], runs, 0.1 * disk),
         ("comparison", [files.comparison], 2, [files.dataset], runs, 0.03 * disk + 90e3),
-        ("model_error", files.model_error, 2, [files.dataset, *beside], len(beside), 150e3),
+        ("model_error", files.model_error, 2, [files.dataset, *files.compared], len(files.compared), 150e3),
         ("answers", files.answers, 2, [files.dataset], runs, 100e3),
         ("sensitivity", files.sensitivity, 2, [files.dataset], runs, 100e3),
-        ("checks", [files.checks], 2, [files.dataset, *files.solutions], runs, 5e3 * runs),
+        ("checks", [files.checks], 2, [files.dataset], runs, 5e3 * runs),
     ]
     for rule, paths, stage, inputs, count, disk_of_table in tables:
         for path in paths:

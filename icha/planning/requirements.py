@@ -1,6 +1,5 @@
-"""Requirements of a campaign: memory, time limits and cores of jobs, free disk space, optional software."""
+"""Requirements of a campaign: memory, time limits and cores of jobs, free disk space."""
 
-import importlib.util
 import math
 import os
 import shutil
@@ -8,35 +7,11 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 
 from icha.configuration.campaign import Campaign
-from icha.configuration.studies import BesideStudy
 from icha.datasets.labels import RunLabels
 from icha.planning.costs import MAP_ARRAYS, RUN_SIZES, job_threads
 from icha.planning.plan import Item, memory_on
 from icha.support import formatting
 from icha.support.formatting import format_count
-
-TAMAAS = "tamaas"
-# ICHA uses the library Tamaas for the entries of these sections of a configuration.
-BY_TAMAAS = ("finite_range", "boundary_element_loops")
-
-
-def further_software(campaign: Campaign) -> tuple[str, ...]:
-    """Return the names of the optional packages that a campaign needs."""
-    return (TAMAAS,) if _sections(campaign) else ()
-
-
-def missing_software(campaign: Campaign) -> str | None:
-    """Return a message if a campaign needs Tamaas and Tamaas is not installed; None otherwise."""
-    if not further_software(campaign) or importlib.util.find_spec(TAMAAS):
-        return None
-    return (
-        f"{', '.join(_sections(campaign))}: needs Tamaas, which is not installed; run `make tamaas` in a clone, or "
-        "`pip install tamaas` elsewhere. ICHA does not include Tamaas, because Tamaas is under AGPL-3.0-or-later."
-    )
-
-
-def _sections(campaign):
-    return [name for name in BY_TAMAAS if getattr(campaign, name)]
 
 
 def surface_threads(campaign: Campaign, surface: str) -> int:
@@ -58,11 +33,6 @@ def run_memory(campaign: Campaign, case: RunLabels) -> int:
     """Return the memory that Snakemake reserves for a run, MB."""
     arrays = max(4, 1.25 * RUN_SIZES[case.model].arrays)
     return _megabytes(600, arrays, campaign.grid(case.surface))
-
-
-def solver_memory(campaign: Campaign, surface: str, entry: BesideStudy) -> int:
-    """Return the memory that Snakemake reserves for boundary elements at a finite range, MB."""
-    return _megabytes(400, 30, campaign.grid(surface) * entry.refinement)
 
 
 def figure_memory(campaign: Campaign, *, holds_topography: bool) -> int:

@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 from icha.configuration.campaign import Campaign
-from icha.configuration.cases import loop_cases, run_cases, solution_cases, surface_cases
+from icha.configuration.cases import run_cases, surface_cases
 from icha.contact.models import REFERENCE_MODEL
 from icha.datasets import results
-from icha.datasets.labels import ContactLabels, RunLabels, SolutionLabels
+from icha.datasets.labels import RunLabels
 
 
 @dataclass(frozen=True)
@@ -18,9 +18,8 @@ class CampaignFiles:
     surfaces : name and seed of each surface, by path.
     runs : labels of each run, by path.
     theories : surface of each file of theories, by path.
-    solutions, loops : labels of each boundary-element solution or loop at a finite range, by path.
     compared : labels of each boundary-element run in a study with both models, by path.
-    model_error : path of the file of model errors; empty if there are no boundary-element results.
+    model_error : path of the file of model errors; empty if no study has both models.
     answers : path of the file of answers; empty if no study has boundary elements for several seeds.
     sensitivity : path of the file of sampled cases; empty if no study has `sample`.
     """
@@ -28,8 +27,6 @@ class CampaignFiles:
     surfaces: dict[str, tuple[str, int]]
     runs: dict[str, RunLabels]
     theories: dict[str, str]
-    solutions: dict[str, SolutionLabels]
-    loops: dict[str, ContactLabels]
     dataset: str
     table: str
     comparison: str
@@ -46,17 +43,12 @@ class CampaignFiles:
     deposit: str
 
     @property
-    def references(self) -> list[str]:
-        """Paths of theories and boundary-element solutions for comparison with runs."""
-        return [*self.theories, *self.solutions, *self.loops]
-
-    @property
     def computed(self) -> list[str]:
         """Paths of all results except the copy of the configuration and the deposit."""
         return [
             *self.surfaces,
             *self.runs,
-            *self.references,
+            *self.theories,
             self.dataset,
             self.table,
             self.comparison,
@@ -84,18 +76,15 @@ def campaign_files(campaign: Campaign, folder: str = "") -> CampaignFiles:
         for file, case in runs.items()
         if case.model == REFERENCE_MODEL and campaign.compares_models(case.study)
     }
-    solutions = each(results.SOLUTION, solution_cases(campaign))
     return CampaignFiles(
         surfaces={path(results.SURFACE, surface=name, seed=seed): (name, seed) for name, seed in surfaces},
         runs=runs,
         theories={path(results.THEORIES, surface=name): name for name, _ in surfaces},
-        solutions=solutions,
-        loops=each(results.LOOP, loop_cases(campaign)),
         dataset=path(results.DATASET),
         table=path(results.TABLE),
         comparison=path(results.COMPARISON),
         compared=compared,
-        model_error=[path(results.MODEL_ERROR)] if compared or solutions else [],
+        model_error=[path(results.MODEL_ERROR)] if compared else [],
         answers=[path(results.ANSWERS)] if _has_answers(campaign, runs.values()) else [],
         sensitivity=[path(results.SENSITIVITY)] if any(each.sample for each in campaign.studies.values()) else [],
         checks=path(results.CHECKS),

@@ -25,12 +25,12 @@ from icha.asperity.full_contact import gaussian_complete_pressure
 from icha.asperity.material import VAN_DER_WAALS_RANGE, WU_HOLDS_FROM, Material
 from icha.asperity.stickiness import stickiness, sticky_rms_height
 from icha.asperity.tabor import describe_short_range
-from icha.boundary_elements.front import Front
 from icha.configuration.campaign import Campaign
 from icha.configuration.cases import run_cases
 from icha.configuration.plausibility import energy_ratio, resolution_of_smooth, rms_curvature, tabor_parameter
 from icha.configuration.surfaces import SelfAffineSurface
 from icha.configuration.topographies import read_surface
+from icha.contact.attraction import straight_strength
 from icha.contact.models import MODELS
 from icha.datasets.labels import is_derived_study
 from icha.support.formatting import format_quantity
@@ -101,6 +101,16 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
     """Return statements about the expected validity of the models; Tabor parameters are those of the mean summit."""
     facts_of = cache(lambda surface: surface_facts(campaign, surface))
     cases, tabor, sticky, loops = [], {}, {}, {}
+
+    def resolved_tension(case):
+        """Return strength, largest tension that the grid resolves, and spacing, of boundary elements."""
+        if not MODELS[case.model].by_cells:
+            return {}
+        material = Material(**campaign.materials[case.material].model_dump(exclude_none=True))
+        spacing = campaign.period(case.surface) / campaign.grid(case.surface)
+        tension = straight_strength(material.adhesion_length / spacing) * material.contact_modulus
+        return {STRENGTH: material.interface_strength, RESOLVED: tension, SPACING: spacing}
+
     for case in run_cases(campaign):
         if is_derived_study(case.study, campaign.studies):
             continue  # runs whose error the estimates correct
@@ -108,7 +118,7 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
         range_of_attraction = {} if value is None else {TABOR: value}
         if campaign.surfaces[case.surface].smooth:
             resolution = min(resolution_of_smooth(campaign, case.study, case), campaign.resolution(case.surface))
-            known = {"full_contact_energy_ratio": math.inf} | range_of_attraction
+            known = {"full_contact_energy_ratio": math.inf} | range_of_attraction | resolved_tension(case)
             cases.append(Case(case.model, case.surface, case.material, known, resolution))
             continue
         facts, by_summits = facts_of(case.surface), MODELS[case.model].by_summits
@@ -130,9 +140,8 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
             known[RMS_HEIGHT] = case.rms_slope * height
             known[STICKY_HEIGHT] = sticky_rms_height(section.rolloff_wavelength, material)
         if MODELS[case.model].by_cells:
-            spacing = campaign.period(case.surface) / campaign.grid(case.surface)
-            tension = Front(material.adhesion_length / spacing).straight_strength * material.contact_modulus
-            known |= {RESOLVED: tension, SPACING: spacing}
+            known |= resolved_tension(case)
+            spacing = known[SPACING]
             if campaign.studies[case.study].unload and material.surface_energy > 0 and not section.shape:
                 lengths = material.surface_energy, material.contact_modulus, rms_curvature(campaign, case), spacing
                 key = case.material, case.surface

@@ -1,1 +1,1 @@
-"""References for comparison with ICHA: theories of rough contact, published points, boundary elements by Tamaas."""
+"""References for comparison with ICHA: theories of rough contact, and published points."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from icha.asperity.material import Material
 from icha.asperity.tabor import describe_short_range
+from icha.contact.attraction import SHORT_RANGE, attraction_on, resolving_spacing
 from icha.contact.models import MODELS
 from icha.path.targets import (
     AREAS,
@@ -21,6 +22,7 @@ from icha.path.targets import (
     Path,
 )
 from icha.references.indentation import axisymmetric_contact, pull_off_state, sphere_contact, stable_branches
+from icha.support.formatting import format_quantity
 from icha.surfaces.resolution import LEAST_CELLS, RADIUS, Resolution, resolution_of
 from icha.surfaces.shapes import Paraboloid, Shape
 from icha.surfaces.surface import FREE, Surface
@@ -133,13 +135,17 @@ def doubts(surface: Surface, material: Material, path: Path, model: str) -> list
         for each in coarse
         if not each.reaches(LEAST_CELLS)
     ]
-    if MODELS[model].by_cells and material.surface_energy:
+    if MODELS[model].by_cells and attraction_on(material, surface.spacing) == SHORT_RANGE:
         if surface.smooth and path.unload and not material.layered:
             pull_off = pull_off_state(surface.shape, material.contact_modulus, material.surface_energy)
             if pull_off and (text := describe_coarse_pull_off(surface.shape, surface.spacing, pull_off.contact_radius)):
                 found.append(text)
         if text := describe_short_range(tabor_parameter_of(surface, material)):
-            found.append(f"boundary elements assume a short range of attraction, but {text}")
+            cells = format_quantity(resolving_spacing(material), "m")
+            found.append(
+                f"the grid does not resolve the range of attraction, so boundary elements assume a short range, but "
+                f"{text}; expected grid cells of at most {cells}"
+            )
     return found
 
 

@@ -66,7 +66,6 @@ def write_report(
     files: Mapping[str, str | os.PathLike] = {},
     results: str | os.PathLike | None = None,
     citations: Sequence[str] = (),
-    further_software: Sequence[str] = (),
 ) -> None:
     """Write the report of a campaign as an HTML page.
 
@@ -85,7 +84,6 @@ def write_report(
     files : further files to which the page links, by their titles.
     results : folder of the results of the campaign, for links to runs and surfaces.
     citations : further sources to cite, such as sources of measurements.
-    further_software : packages whose versions the page lists in addition to `SOFTWARE`.
     """
 
     def link(target):
@@ -108,7 +106,7 @@ def write_report(
         files={name: link(target) for name, target in files.items()},
         configuration=configuration,
         citations=citations,
-        software={name: version(name) for name in (*SOFTWARE, *further_software)},
+        software={name: version(name) for name in SOFTWARE},
     )
 
 

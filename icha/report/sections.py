@@ -12,9 +12,9 @@ import xarray as xr
 
 from icha.analysis.measured_error import left_out_runs
 from icha.analysis.model_error import SUMMARISED
+from icha.contact.attraction import FINITE_RANGE, SHORT_RANGE
 from icha.datasets.labels import place_of, slopes_of, surfaces_and_slopes
 from icha.datasets.surface_file import measured_scale
-from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.looks import MOST_COLOURS, graded_colours, legend_below, named_handles, some_of
 from icha.figures.style import COLOURS, TWO_COLUMNS, in_style, logarithmic_axes, new_figure
 from icha.report.template import format_mean, per_cent
@@ -96,7 +96,7 @@ def summarise_errors(errors: xr.Dataset) -> dict:
         states = errors.isel(place_of(errors, contact))
         for p in errors["reduced_pressure"].values.tolist():
             state = states.sel(reduced_pressure=p)
-            # An entry need not contain all combinations.
+            # A study need not contain all combinations.
             if np.isfinite(state["area_error"]).any():
                 areas = {
                     "area": float(state["contact_area_fraction"].mean()),
@@ -109,22 +109,23 @@ def summarise_errors(errors: xr.Dataset) -> dict:
                     if len(values)
                 }
                 rows.append(contact | {"reduced_pressure": p} | areas | means)
-    tabor = errors["tabor_parameter"].values
+    materials, attraction = errors["material"].values.tolist(), errors["attraction"]
+    tabor = errors["tabor_parameter"].where(attraction == FINITE_RANGE).values
+    tabor = tabor[np.isfinite(tabor)]
     return {
-        "name": errors.attrs["entry"],
         "study": errors.attrs["study"],
-        "short_range": errors.attrs["truth"] == SHORT_RANGE,
+        "short_range": bool((attraction == SHORT_RANGE).any()),
+        "finite_range": [name for name in materials if (attraction.sel(material=name) == FINITE_RANGE).any()],
         "axes": {label: errors[label].values.tolist() for label in ("material", "seed")}
         | {"rms_slope": slopes_of(errors)},
         "states": int(errors["area_error"].count()),
         "left_out": left_out_runs(errors).sentence,
         "grids": sorted({int(n) for n in _finite(errors["solution_grid"])}),
-        "adhesive": bool((errors["surface_energy"] > 0).any()),
-        "tabor": list(dict.fromkeys(f"{mu:.2g}" for mu in (np.nanmin(tabor), np.nanmax(tabor)))),
+        "tabor": list(dict.fromkeys(f"{mu:.2g}" for mu in (tabor.min(), tabor.max()))) if tabor.size else [],
         "load_error": float(np.abs(errors["load_error"]).max()),
         "residual": float(errors["residual"].max()),
         "rows": rows,
-        **{name: _spread(_finite(errors[name])) for name in (*SUMMARISED, "perimeter_correction")},
+        **{name: _spread(_finite(errors[name])) for name in SUMMARISED},
     }
 
 

@@ -113,7 +113,3 @@ SURFACE_ENERGY = FloatRange("J/m^2", least=0, most=1e24)
 # Surface energy divided by contact modulus, for materials with adhesion.
 ADHESION_LENGTH = FloatRange("m", least=1e-40, most=1e9)
 POISSON_RATIO = FloatRange(least=0, most=0.5)
-
-# Boundary elements.
-TOLERANCE = FloatRange(least=1e-12, most=1e-4)
-REFINEMENT = IntegerRange(1, 16)

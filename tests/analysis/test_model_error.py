@@ -4,13 +4,23 @@ import numpy as np
 import pytest
 import small_campaign as small
 import xarray as xr
-from compared_campaign import PRESSURES, own_solution, patches, runs, solutions, tree
+from compared_campaign import (
+    AREA_FACTORS,
+    PRESSURES,
+    errors,
+    own_patches,
+    patches,
+    patches_at_finite_range,
+    runs,
+    tree,
+    tree_of_both,
+)
 
+import icha
 from icha.analysis.model_error import (
     AXES,
     SHARED,
     SUMMARISED,
-    compare_state,
     contact_of_spots,
     distribution_distance,
     jaccard,
@@ -18,49 +28,50 @@ from icha.analysis.model_error import (
     shared,
     state_of,
 )
+from icha.contact.attraction import FINITE_RANGE, NO_ATTRACTION, SHORT_RANGE
 from icha.contact.model import GAP_BINS, PRESSURE_BINS
 from icha.datasets.campaign import campaign_tree, find_snapshot
 from icha.datasets.files import read_campaign, write_dataset
-from icha.datasets.labels import RunLabels, SolutionLabels
+from icha.datasets.labels import RunLabels
 from icha.datasets.variables.campaign import COMPLETE, INCOMPLETE
-from icha.datasets.variables.model_error import SHORT_RANGE
-from icha.references.finite_range import finite_range_solution
+
+
+def compared_with(truths):
+    """Return the errors of the study with the given boundary elements."""
+    return model_error(tree_of_both(), truths)["one"].to_dataset()
 
 
 def test_relative_errors_are_those_put_in():
-    errors = model_error(tree(), solutions(area=lambda labels: 1.25, separation=0.8))["truth"]
-    np.testing.assert_allclose(errors["area_error"].values, 1 / 1.25 - 1, rtol=1e-12)
-    np.testing.assert_allclose(errors["separation_error"].values, 1 / 0.8 - 1, rtol=1e-12)
-    assert errors["area_error"].dims == AXES and errors["area_error"].shape == (1, 3, 1, 2, 2)
-    np.testing.assert_array_equal(errors["shared_of_icha"].values * errors["shared_of_boundary_elements"].values, 1)
+    compared = compared_with(patches(area=1.25, separation=0.8))
+    np.testing.assert_allclose(compared["area_error"].values, 1 / 1.25 - 1, rtol=1e-12)
+    np.testing.assert_allclose(compared["separation_error"].values, 1 / 0.8 - 1, rtol=1e-12)
+    assert compared["area_error"].dims == AXES and compared["area_error"].shape == (1, 3, 1, 2, 2)
+    np.testing.assert_array_equal(compared["shared_of_icha"] * compared["shared_of_boundary_elements"], 1)
     run = runs()["one", "asperities", "rough", 2, 1.0, "hertz"]
     at = find_snapshot(run, "reduced_pressure", 1e-2)
     place = {"surface": "rough", "seed": 2, "rms_slope": 1.0, "material": "hertz", "reduced_pressure": 1e-2}
-    state = errors.to_dataset().sel(place)
+    state = compared.sel(place)
     assert float(state["contact_area_fraction"]) == float(state_of(run, at)["contact_area_fraction"])
     edges = np.diff(state["pressure_bin_edges"].values)
     area = float(state["contact_area_fraction"])
     assert float(np.sum(state["pressure_density"].values * edges)) == pytest.approx(area, rel=1e-9)
 
 
-def test_runs_of_the_other_model_are_compared_at_the_same_stops():
-    errors = model_error(tree(), runs=patches(area=1.25, separation=0.8))["one"].to_dataset()
-    assert errors.attrs["truth"] == SHORT_RANGE and errors["reduced_pressure"].values.tolist() == list(PRESSURES)
-    assert (errors["status"] == COMPLETE).all()
-    np.testing.assert_allclose(errors["area_error"].values, 1 / 1.25 - 1, rtol=1e-12)
-    np.testing.assert_allclose(errors["separation_error"].values, 1 / 0.8 - 1, rtol=1e-12)
-    # Contact has an edge: its energetic area is its area. What was moved are areas, not the distributions and maps.
-    np.testing.assert_array_equal(errors["energetic_area_error"], errors["area_error"])
-    np.testing.assert_allclose(errors["gap_distribution_distance"], 0, atol=1e-12)
-    np.testing.assert_array_equal(errors["jaccard"], 1)
-    np.testing.assert_allclose(errors["residual"], 1e-4)
-    np.testing.assert_allclose(errors["load_error"], 0, atol=1e-6)
+def test_boundary_elements_are_compared_at_the_same_stops():
+    compared = compared_with(patches(area=1.25, separation=0.8))
+    assert compared["reduced_pressure"].values.tolist() == list(PRESSURES)
+    assert (compared["status"] == COMPLETE).all()
+    # At a short range, the energetic area is the area. What was changed are areas, not the distributions and maps.
+    np.testing.assert_array_equal(compared["energetic_area_error"], compared["area_error"])
+    np.testing.assert_allclose(compared["gap_distribution_distance"], 0, atol=1e-12)
+    np.testing.assert_array_equal(compared["jaccard"], 1)
+    np.testing.assert_allclose(compared["residual"], 1e-4)
+    np.testing.assert_allclose(compared["load_error"], 0, atol=1e-6)
 
 
 def test_loads_without_a_snapshot_have_errors_of_area_and_separation_only():
     kept = [(labels, run.isel(snapshot=[1])) for labels, run in patches(area=2.0)]
-    errors = model_error(tree(), runs=kept)
-    errors = errors["one"].to_dataset()
+    errors = compared_with(kept)
     np.testing.assert_allclose(errors["area_error"], -0.5, rtol=1e-12)
     assert np.isnan(errors["jaccard"].isel(reduced_pressure=0)).all()
     np.testing.assert_array_equal(errors["jaccard"].isel(reduced_pressure=1), 1)
@@ -72,35 +83,41 @@ def test_a_cell_is_in_contact_from_its_half_on():
     slight = run.assign(contact_map=xr.where(covered, run["contact_map"], np.float32(0.4)))
     half = run.assign(contact_map=(0.5 * covered).astype(np.float32))
     for changed in (slight, half):
-        errors = model_error(tree(), runs=[(labels, changed)])["one"]
+        errors = compared_with([(labels, changed)])
         np.testing.assert_array_equal(errors["jaccard"], 1)
 
 
 def test_runs_that_failed_by_either_model_do_not_count():
     (first, *others) = patches(area=1.25)
     labels, run = first
-    errors = model_error(tree(), runs=[(labels, run.isel(step=[0]).assign_attrs(incomplete="stuck")), *others])["one"]
+    errors = compared_with([(labels, run.isel(step=[0]).assign_attrs(incomplete="stuck")), *others])
     place = {label: getattr(labels, label) for label in ("surface", "seed", "rms_slope", "material")}
     assert int(errors["status"].sel(place)) == INCOMPLETE
     assert np.isnan(errors["area_error"].sel(place)).all()
     np.testing.assert_allclose(errors["area_error_mean"], 1 / 1.25 - 1, rtol=1e-12)
 
 
-def test_energetic_area_counts_with_adhesion_only():
-    errors = model_error(tree(), solutions(area=lambda labels: 1.25))["truth"].to_dataset()
-    np.testing.assert_allclose(errors["energetic_area_error"].sel(material="soft"), 1 / 1.5 - 1, rtol=1e-12)
-    bare = errors.sel(material="hertz")
+def test_the_energetic_area_is_that_of_a_finite_range():
+    compared = errors()["one"].to_dataset()
+    expected = 1 / (1.2 * np.array(list(AREA_FACTORS.values()))) - 1
+    soft, bare = (compared.sel(material=name) for name in ("soft", "hertz"))
+    for load in PRESSURES:
+        found = soft["energetic_area_error"].sel(reduced_pressure=load).values.ravel()
+        np.testing.assert_allclose(found, expected, rtol=1e-12)
     np.testing.assert_array_equal(bare["energetic_area_error"], bare["area_error"])
+    assert set(soft["attraction"].values.ravel()) == {FINITE_RANGE}
+    assert set(bare["attraction"].values.ravel()) == {NO_ATTRACTION}
+    short = compared_with(patches())["attraction"].sel(material="soft")
+    assert set(short.values.ravel()) == {SHORT_RANGE}
 
 
 def test_scatter_over_the_seeds():
-    factor = {1: 1.1, 2: 1.2, 3: 1.6}
-    pairs = solutions(area=lambda labels: factor[labels.seed])
-    errors = model_error(tree(), reversed(pairs))["truth"]
-    expected = 1 / np.array(list(factor.values())) - 1
-    np.testing.assert_allclose(errors["area_error_mean"].values, expected.mean(), rtol=1e-12)
-    np.testing.assert_allclose(errors["area_error_deviation"].values, expected.std(ddof=1), rtol=1e-12)
-    single = model_error(tree(), [pair for pair in pairs if pair[0].seed == 2])["truth"]
+    pairs = [pair for pair in patches_at_finite_range() if pair[0].material == "soft"]
+    compared = compared_with(reversed(pairs))
+    expected = 1 / np.array(list(AREA_FACTORS.values())) - 1
+    np.testing.assert_allclose(compared["area_error_mean"].values, expected.mean(), rtol=1e-12)
+    np.testing.assert_allclose(compared["area_error_deviation"].values, expected.std(ddof=1), rtol=1e-12)
+    single = compared_with([pair for pair in pairs if pair[0].seed == 2])
     np.testing.assert_allclose(single["area_error_mean"].values, 1 / 1.2 - 1, rtol=1e-12)
     assert not [f"{name}_deviation" for name in SUMMARISED if f"{name}_deviation" in single]
 
@@ -154,81 +171,67 @@ def test_overlap_of_maps():
 
 
 def test_spots_lie_where_boundary_elements_find_contact():
-    """A map that is mirrored, transposed or shifted by a few cells shares next to nothing with the solution."""
-    run = runs()["one", "asperities", "rough", 1, 1.0, "hertz"]
-    solution = finite_range_solution(small.surface(), small.MATERIALS["hertz"], 3e-3, refinement=2, seed=1)
-    compared = compare_state(run, 0, solution)
-    assert compared["jaccard"] > 0.5
-    spots = contact_of_spots(run, 0, solution.sizes["x"])
-    contact = solution["contact"].values == 1
-    assert compared["jaccard"] == jaccard(spots, contact)
+    """A map that is mirrored, transposed or shifted by a few cells shares next to nothing with the other map."""
+    labels = RunLabels("one", "asperities", "rough", 1, 1.0, "hertz")
+    path = icha.Path(reduced_pressures=PRESSURES[:1], max_step=0.2)
+    fine = small.surface(1).refined(2)
+    truth = icha.simulate(fine, small.MATERIALS["hertz"], path, seed=1, model="boundary_elements")
+    compared = compared_with([(labels._replace(model="boundary_elements"), truth)]).isel(dict.fromkeys(AXES, 0))
+    assert float(compared["jaccard"]) > 0.5
+    contact = truth["contact_map"].values[0] >= 0.5
+    spots = contact_of_spots(runs()[labels], 0, len(contact))
+    assert float(compared["jaccard"]) == jaccard(spots, contact)
     for other in (contact.T, contact[::-1], contact[:, ::-1], np.roll(contact, 8, 0), np.roll(contact, 8, 1)):
         assert jaccard(spots, other) < 0.3
     # Both carry the same load: less contact is at higher pressure, so the distance is at least the areas' difference
     # times the lowest pressure, and it is less than twice the mean pressure in any case.
-    assert 0 < compared["pressure_distribution_distance"] < 2
-    assert abs(compared["area_error"]) < 0.3 and abs(compared["separation_error"]) < 0.1
+    assert 0 < float(compared["pressure_distribution_distance"]) < 2
+    assert abs(float(compared["area_error"])) < 0.3 and abs(float(compared["separation_error"])) < 0.1
 
 
-def test_several_entries_and_a_part_of_a_study(tmp_path):
-    adhesive = solutions("adhesive", lambda labels: labels.material == "soft" and labels.seed == 3)
-    bare = solutions("bare", lambda labels: labels.material == "hertz")
-    errors = model_error(tree(), [*adhesive, *bare], attrs={"license": "CC0-1.0"})
-    assert list(errors.children) == ["adhesive", "bare"] and errors.attrs["license"] == "CC0-1.0"
-    assert errors["bare"]["material"].values.tolist() == ["hertz"]
-    assert errors["adhesive"]["seed"].values.tolist() == [3] and errors["adhesive"].attrs["study"] == "one"
-    write_dataset(errors, tmp_path / "a.nc")
+def test_a_part_of_a_study(tmp_path):
+    one = patches(lambda labels: labels.material == "soft" and labels.seed == 3)
+    found = model_error(campaign_tree([*runs().items(), *one]), one, attrs={"license": "CC0-1.0"})
+    assert list(found.children) == ["one"] and found.attrs["license"] == "CC0-1.0"
+    assert found["one"]["material"].values.tolist() == ["soft"] and found["one"]["seed"].values.tolist() == [3]
+    write_dataset(found, tmp_path / "a.nc")
     read = read_campaign(tmp_path / "a.nc")
-    np.testing.assert_array_equal(read["bare"]["jaccard"].values, errors["bare"]["jaccard"].values)
+    np.testing.assert_array_equal(read["one"]["jaccard"].values, found["one"]["jaccard"].values)
 
 
-STATE = r"entry truth, run one/rough/seed1/slope1/soft, reduced pressure 0\.003: "
+LABELS = RunLabels("one", "asperities", "rough", 1, 1.0, "soft")
+TRUTH = LABELS._replace(model="boundary_elements")
 
 
 @pytest.mark.parametrize("name", SHARED)
 def test_another_contact_is_refused(name):
-    labels = RunLabels("one", "asperities", "rough", 1, 1.0, "soft")
-    solution = own_solution(runs()[labels], 3e-3)
-    changed = solution.assign({name: solution[name] * 1.001})
-    with pytest.raises(ValueError, match=STATE + name):
-        model_error(tree(), [(SolutionLabels("truth", labels.study, *labels[2:], 3e-3), changed)])
+    truth = own_patches(runs()[LABELS])
+    with pytest.raises(ValueError, match=f"{TRUTH}: {name}"):
+        model_error(tree(), [(TRUTH, truth.assign({name: truth[name] * 1.001}))])
 
 
 def test_what_cannot_be_compared_is_named():
-    labels = RunLabels("one", "asperities", "rough", 1, 1.0, "soft")
-    place = SolutionLabels("truth", labels.study, *labels[2:], 3e-3)
-    solution = own_solution(runs()[labels], 3e-3)
-    with pytest.raises(ValueError, match=STATE + "seed is 1 for the run, 2 for the solution"):
-        model_error(tree(), [(place, solution.assign(seed=2))])
-    with pytest.raises(ValueError, match=STATE + r"the solution is for reduced pressure 0\.01"):
-        model_error(tree(), [(place, own_solution(runs()[labels], 1e-2))])
-    with pytest.raises(ValueError, match=r"reduced pressure 0\.02: no snapshot of reduced_pressure 0\.02; the run has"):
-        model_error(tree(), [(place._replace(reduced_pressure=0.02), solution)])
-    with pytest.raises(ValueError, match=r"run one/rough/seed9/slope1/soft.*no seed 9"):
-        model_error(tree(), [(place._replace(seed=9), solution)])
-    with pytest.raises(ValueError, match=STATE + "the contact area of boundary elements is 0"):
-        model_error(tree(), [(place, own_solution(runs()[labels], 3e-3, area=0.0))])
+    truth = own_patches(runs()[LABELS])
+    with pytest.raises(ValueError, match=f"{TRUTH}: seed is 1 for the run, 2 for the other run"):
+        model_error(tree(), [(TRUTH, truth.assign(seed=2))])
+    with pytest.raises(ValueError, match="no seed 9"):
+        model_error(tree(), [(TRUTH._replace(seed=9), truth)])
 
 
 def test_runs_that_ended_early_do_not_count(tmp_path):
-    """Of three seeds one run has failed; of the other material two have, and one has not been solved for."""
-    factor = {1: 1.1, 2: 1.2, 3: 1.6}
-    failed = [
-        RunLabels("one", "asperities", "rough", 3, 1.0, "soft"),
-        *(RunLabels("one", "asperities", "rough", k, 1.0, "hertz") for k in (1, 2)),
-    ]
+    """Of three seeds one run has failed; of the other material two have, and one has no boundary elements."""
+    failed = [LABELS._replace(seed=3), *(LABELS._replace(seed=k, material="hertz") for k in (1, 2))]
     nothing = {"step": slice(0, 0), "snapshot": slice(0, 0), "spot": slice(0, 0)}
     members = {
         labels: run.isel(nothing).assign_attrs(incomplete="sticky") if labels in failed else run
         for labels, run in runs().items()
     }
-    pairs = solutions(area=lambda labels: factor[labels.seed])
-    unsolved = RunLabels("one", "asperities", "rough", 3, 1.0, "hertz")
-    pairs = [(labels, solution) for labels, solution in pairs if labels.run != unsolved]
-    errors = model_error(campaign_tree(members.items()), pairs)
-    write_dataset(errors, tmp_path / "e.nc")
-    for entry in (errors["truth"].to_dataset(), read_campaign(tmp_path / "e.nc")["truth"].to_dataset()):
-        soft, bare = (entry.isel(surface=0, rms_slope=0).sel(material=name) for name in ("soft", "hertz"))
+    unsolved = TRUTH._replace(seed=3, material="hertz")
+    truths = [(labels, run) for labels, run in patches_at_finite_range() if labels != unsolved]
+    found = model_error(campaign_tree([*members.items(), *truths]), truths)
+    write_dataset(found, tmp_path / "e.nc")
+    for compared in (found["one"].to_dataset(), read_campaign(tmp_path / "e.nc")["one"].to_dataset()):
+        soft, bare = (compared.isel(surface=0, rms_slope=0).sel(material=name) for name in ("soft", "hertz"))
         assert soft["status"].values.tolist() == [0, 0, 1] and bare["status"].values.tolist() == [1, 1, 3]
         known = np.array([1 / 1.1, 1 / 1.2]) - 1
         np.testing.assert_allclose(soft["area_error"].values, [[known[0]] * 2, [known[1]] * 2, [np.nan] * 2])

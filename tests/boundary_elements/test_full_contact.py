@@ -4,10 +4,7 @@ import numpy as np
 import pytest
 
 import icha
-from icha.boundary_elements.adhesive import solve_adhesive_contact
 from icha.boundary_elements.contact import contact_of
-from icha.boundary_elements.elastic_contact import Contact
-from icha.boundary_elements.front_solver import TOLERANCES, FrontProblem
 from icha.checks.run import RESIDUAL_LIMIT, check_run
 from icha.contact.model import PRESSURE, Control
 from validation.closed_forms import Sinusoid
@@ -69,7 +66,8 @@ def test_without_adhesion_contact_closes_at_the_largest_tension_of_full_contact(
     run = icha.simulate(surface, HARD, path, model="boundary_elements")
     area = run.contact_area_fraction.values[run.step_kind.values == "reduced_pressure"]
     assert area[1] < 1 == area[2]
-    assert abs(float(run.hysteresis_loss)) <= 1e-10 * float(abs(run.work).max())
+    # Cells without pressure may count as contact in one direction only, so unloading divides other steps.
+    assert abs(float(run.hysteresis_loss)) <= 1e-6 * float(abs(run.work).max())
     assert not [check for check in check_run(run) if not check.passed]
 
 
@@ -122,24 +120,6 @@ def test_full_contact_opens_at_the_strength_of_its_flaw():
     assert float(run.nominal_pressure.values[full].min()) == pytest.approx(opening, rel=1e-6)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("gap", "cells"), [(1e-3, 2), (3e-4, 20)])
-def test_few_cells_that_open_in_full_contact_reach_the_minimum_of_the_energy(gap, cells):
-    # The range of the attraction exceeds the roughness, so all cells open a little before all but some close again.
-    surface = icha.SelfAffineSpectrum(1.0, 0.5, 1 / 6, 0.8, 1.0).realise(48, 1)
-    energy = (5 * surface.spacing) ** 3 * surface.rms_curvature**2
-    contact = contact_of(surface, icha.Material(1.0, energy, 2 * np.sqrt(energy * surface.spacing)))
-    separation = gap * surface.rms_height / surface.spacing
-    problem = FrontProblem(contact.space, contact.front, contact.topography, separation)
-    order, energies = np.argsort(contact.full_contact_pressure.ravel()), []
-    for opened in (cells, 200):
-        closed = np.sort(order[opened:])
-        start = Contact(closed, np.ones(len(closed)), np.zeros(len(closed)))
-        state, _ = solve_adhesive_contact(problem, contact.summits, start, TOLERANCES.fine)
-        energies.append(problem.energy(state))
-    assert energies[0] == pytest.approx(energies[1], rel=1e-8)
-
-
 @pytest.mark.parametrize("number", range(8))
 def test_random_loops_end(number):
     """All of them are run by `python -m validation.random_loops`."""
@@ -152,6 +132,7 @@ def test_the_residual_is_small_where_the_critical_opening_exceeds_the_rms_height
     heights = -1e-6 * np.exp(-(x[:, None] ** 2 + x**2) / 2 / 0.08**2)
     surface, material = icha.Surface(heights, 100e-6), icha.Material(1e6, 0.8, 1e-8)
     contact = contact_of(surface, material)
-    assert contact.front.critical_opening * contact.spacing > 5 * surface.rms_height
-    run = icha.simulate(surface, material, icha.Path(area_fractions=[0.1]), model="boundary_elements")
+    assert contact.attraction.reach * contact.spacing > 5 * surface.rms_height
+    path = icha.Path(mean_separations=[0.2 * surface.rms_height])
+    run = icha.simulate(surface, material, path, model="boundary_elements")
     assert "failed_checks" not in run.attrs and float(run["residual"].max()) < RESIDUAL_LIMIT

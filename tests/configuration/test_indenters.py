@@ -72,14 +72,6 @@ def test_the_thickness_of_a_layer_is_varied(load):
     assert sorted(layers.values()) == [1e-3, 2e-3]
 
 
-def test_references_need_periodic_surfaces_and_half_spaces(refused):
-    layer = {"materials.soft.thickness": "1 mm", "materials.soft.poisson_ratio": 0.5}
-    entry = {"finite_range": {"truth": {"study": "one", "reduced_pressures": [0.003]}}}
-    refused("", layer | entry, "finite_range.truth.study: 'one' contains the layer 'soft'; expected")
-    free = {"surfaces.rough.boundary": "free"}
-    refused("", free | entry, "finite_range.truth.study: 'one' contains the surface 'rough' with free edges; expected")
-
-
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

@@ -120,18 +120,23 @@ def test_contact_radii_of_smooth_shapes(shape, targets, cells, load, refused):
 
 
 def test_long_ranges_of_boundary_elements(load, refused):
-    bead = smooth({"sphere": {"radius": "10 um"}}, side="1 um", grid=128, forces=["2 uN"])
+    bead = smooth({"sphere": {"radius": "10 um"}}, side="12 um", grid=96, forces=["2 mN"])
     glass = {"contact_modulus": "70 GPa", "surface_energy": "50 mJ/m^2"}
     message = "materials.soft.interaction_range: '500 pm' is unusual for boundary elements of soft on rough"
     found = confirmed(load, refused, bead | {"materials.soft": glass}, message, "materials.soft.interaction_range")
     assert "Tabor parameter 0.34" in found["short range"].text and "16 %" in found["short range"].text
     assert "JKR does not hold" in found["indenter"].text and not found["indenter"].good
+    # A finer grid resolves the range.
+    fine = bead | {"surfaces.rough.grid": 128, "materials.soft": glass}
+    resolved = stated(load(fine))
+    assert "short range" not in resolved and resolved["finite range"].good
+    assert "soft on rough" in resolved["finite range"].text
     # From 1 to 3 there is only the statement.
     assert not stated(load(bead | {"materials.soft": glass | {"interaction_range": "0.1 nm"}}))["short range"].good
     assert "short range" not in stated(load(bead | {"materials.soft": glass | {"interaction_range": "0.05 nm"}}))
     # Rough surfaces have the radius of the rms curvature. Asperities assume no short range.
-    rough = {"materials.soft.interaction_range": "120 nm", "studies.one.models": ["boundary_elements"]}
-    refused("", rough, "materials.soft.interaction_range: '120 nm' is unusual for boundary elements of soft on rough")
+    rough = {"materials.soft.interaction_range": "60 nm", "studies.one.models": ["boundary_elements"]}
+    refused("", rough, "materials.soft.interaction_range: '60 nm' is unusual for boundary elements of soft on rough")
     load(rough | {"studies.one.models": ["asperities"]})
 
 

@@ -122,19 +122,6 @@ WRONG = {
         None,
         "studies: defines 40040000 targets of all runs; expected at most 5000000",
     ),
-    "solutions": (
-        {
-            "studies.one.seeds": "1..10000",
-            "finite_range": {f"b{i}": {"study": "one", "reduced_pressures": [0.01, 0.02]} for i in range(3)},
-        },
-        None,
-        "finite_range: defines 120000 solutions; expected at most 100000",
-    ),
-    "entries beside a study": (
-        "finite_range",
-        {f"b{i}": {"study": "one", "reduced_pressures": [0.01]} for i in range(101)},
-        "is not valid; expected at most 100 items",
-    ),
     "defaults of all studies": (
         {
             "defaults": {"studies": {"targets": {"reduced_pressures": [1e-3 + 1e-6 * i for i in range(2000)]}}},
@@ -178,9 +165,6 @@ def test_of_a_thousand_problems_the_first_are_reported(load):
         load({f"key{i}": 1 for i in range(1000)} | {"studies.one.surfaces": [f"none{i}" for i in range(1000)]})
     lines = str(error.value).splitlines()
     assert len(lines) == MOST_PROBLEMS + 1 and lines[-1].endswith("there are more problems; correct these first")
-    with pytest.raises(ConfigurationError) as error:
-        load({"finite_range": {"b": {"study": "one", "seeds": "3..9000", "reduced_pressures": [0.01]}}})
-    assert len(str(error.value)) < 10_000
 
 
 def test_thousands_of_targets_snapshots_and_seeds_are_planned(load, tmp_path):
@@ -191,15 +175,6 @@ def test_thousands_of_targets_snapshots_and_seeds_are_planned(load, tmp_path):
         "studies.one.unload": True,
     }
     assert len(plan(load(study).campaign, tmp_path)) > 0
-    beside = {"study": "one", "seeds": "1..10000", "reduced_pressures": [0.01]}
-    many = load(
-        {
-            "studies.one.seeds": "1..10000",
-            "materials.soft.interaction_range": "120 nm",
-            "finite_range": {f"b{i}": beside for i in range(5)},
-        }
-    )
-    assert len(many.campaign.contacts_beside(many.campaign.finite_range["b0"])) == 20_000
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import pint
 import pytest
 from outside_validators import REPOSITORY, python_of_validators
 
-from icha.datasets.format import CAMPAIGN, RUN, SOLUTION, SURFACE, identify_file
+from icha.datasets.format import CAMPAIGN, RUN, SURFACE, identify_file
 from icha.datasets.labels import LABELS
 
 
@@ -122,12 +122,11 @@ sys.exit(not validate.validate(pathlib.Path(sys.argv[2]), ["compliance-checker"]
 
 def test_every_kind_of_file_is_known(folder):
     found = {path.stem: identify_file(path)[0] for path in sorted(folder.glob("*.nc"))}
-    assert {name for name, kind in found.items() if kind == RUN} == {"run", "run_without_snapshots", "cycle"}
-    solutions = {name for name, kind in found.items() if kind == SOLUTION}
-    assert solutions == {"boundary_elements", "boundary_elements_adhesive"}
+    runs = {"run", "run_without_snapshots", "cycle", "boundary_elements", "boundary_elements_adhesive"}
+    assert {name for name, kind in found.items() if kind == RUN} == runs
     assert found["campaign"] == CAMPAIGN and found["surface"] == SURFACE
-    others = {name: kind for name, kind in found.items() if kind not in (RUN, SOLUTION, CAMPAIGN, SURFACE)}
-    assert set(others) == {"aggregated", "model_error", "theories", "loop"}
+    others = {name: kind for name, kind in found.items() if kind not in (RUN, CAMPAIGN, SURFACE)}
+    assert set(others) == {"aggregated", "model_error", "theories"}
     assert len(set(others.values())) == len(others)
 
 

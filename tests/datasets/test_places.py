@@ -116,7 +116,7 @@ def test_xarray_alone_selects_a_surface_and_its_slope(tmp_path):
 def test_figures_of_either_form_show_the_same():
     study, tree, other = crops.STUDY, crops.tree(), crops.square_tree()
     figures = {
-        "fig2": lambda tree, errors: fig2_area_and_gap.figure(tree, None, errors, study=study),
+        "fig2": lambda tree, errors: fig2_area_and_gap.figure(tree, study=study),
         "fig3": lambda tree, errors: fig3_distributions.figure(tree, study=study),
         "fig5": lambda tree, errors: fig5_multi_slope.figure(tree, study=study),
         "fig6": lambda tree, errors: fig6_spots_by_slope.figure(tree, study=study),

@@ -170,7 +170,7 @@ def write_results(folder, campaign):
     """The dataset of a campaign, of small surfaces."""
     runs = []
     for case in run_cases(campaign):
-        path = campaign.studies[case.study].path_settings(campaign.snapshots_of(case.study))
+        path = campaign.studies[case.study].path_settings()
         material = campaign.materials[case.material].model_dump(exclude_none=True)
         runs.append((case, small_run(case, (frozen(path), frozen(material)))))
     attributes = {"title": campaign.title, "campaign": campaign.name}

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from icha.asperity.material import Material
+from icha.contact.attraction import resolving_spacing
 from icha.path.targets import Path
 from icha.references import indentation
 from icha.references.limits import doubts, radius_at_target
@@ -64,11 +65,14 @@ def test_coarse_grids_of_shapes_are_doubted(shape, reason):
 
 
 def test_long_ranges_are_doubted_with_boundary_elements_only():
-    glass, bead = Material(70e9, 0.05), surface(Sphere(10e-6), 128, 1e-6)
-    (found,) = doubts(bead, glass, Path(forces=[2e-6]), "boundary_elements")
+    glass, bead = Material(70e9, 0.05), surface(Sphere(10e-6), 96, 12e-6)
+    assert resolving_spacing(glass) == pytest.approx(109.6e-9, rel=1e-3)
+    (found,) = doubts(bead, glass, Path(forces=[2e-3]), "boundary_elements")
     assert "Tabor parameter 0.34" in found and "1.74 pi dgamma R" in found and "16 %" in found
-    assert doubts(bead, glass, Path(forces=[2e-6]), "asperities") == []
-    assert doubts(bead, Material(70e9, 0.0), Path(forces=[2e-6]), "boundary_elements") == []
+    assert doubts(bead, glass, Path(forces=[2e-3]), "asperities") == []
+    assert doubts(bead, Material(70e9, 0.0), Path(forces=[2e-3]), "boundary_elements") == []
+    # A finer grid resolves the range.
+    assert doubts(surface(Sphere(10e-6), 128, 12e-6), glass, Path(forces=[2e-3]), "boundary_elements") == []
 
 
 def test_coarse_pull_offs_are_doubted_if_the_path_unloads():

@@ -9,7 +9,6 @@ from icha.support import rules, values
 OUTSIDE = [
     (rules.POSITIVE, 0.0, "a number greater than 0"),
     (rules.HURST, 1.5, "a number in (0, 1]"),
-    (rules.TOLERANCE, 1e-3, "a number in [1e-12, 1e-4]"),
     (ASPERITY_RANGES["area_fraction"], 0.3, "a number in [1e-9, 0.25], where the asperity model holds"),
     (ASPERITY_RANGES["reduced_pressure"], 0.2, "a number of at most 0.15, where the asperity model holds"),
     (rules.LENGTH, 1e100, "a number in [1e-24, 1e9]"),

@@ -4,6 +4,7 @@ import compared_campaign as compared
 import numpy as np
 import pytest
 import separate_asperities as separate
+import xarray as xr
 
 from icha.analysis.model_error import model_error
 from validation import hysteresis
@@ -12,29 +13,20 @@ from validation.model_error import errors_by_load, tables
 
 @pytest.fixture(scope="module")
 def entries():
-    def solutions(entry, material, seeds=(1, 2, 3)):
-        return compared.solutions(entry, lambda labels: labels.material == material and labels.seed in seeds)
-
-    grids = [
-        *solutions("adhesionless", "hertz"),
-        *solutions("coarse", "hertz", (2,)),
-        *solutions("fine", "hertz", (2,)),
-    ]
-    ranges = [*solutions("adhesive", "soft"), *solutions("ranges", "soft"), *solutions("shortest_range", "soft", (1,))]
-    found = model_error(compared.tree(), [*grids, *ranges], runs=compared.patches())
-    entries = {name: entry.to_dataset() for name, entry in found.children.items()}
-    return entries | {"short_range": entries["one"]}
+    short = model_error(compared.tree_of_both(), compared.patches())["one"].to_dataset()
+    finite = compared.errors()["one"].to_dataset()
+    return {"short_range": short, "finite_range": finite.sel(material=["soft"]), "ranges": finite}
 
 
 def test_every_table_of_the_models_error_can_be_written(entries):
-    found = tables(entries, compared.tree(), "one", [])
-    assert len(found) == 12
+    found = tables(entries, xr.DataTree())
+    assert len(found) == 10
     for name, table in found.items():
         assert "nan" not in str(table) and all(len(row) == len(table.head) for row in table.rows), name
 
 
 def test_errors_are_in_per_cent_with_their_scatter():
-    _, (row,), _ = errors_by_load(compared.errors()["adhesive"].to_dataset(), "area_error")
+    _, (row,), _ = errors_by_load(compared.errors()["one"].to_dataset().sel(material=["soft"]), "area_error")
     each = [100 * (1 / factor - 1) for factor in compared.AREA_FACTORS.values()]
     assert row == ["`rough`", *[f"{np.mean(each):+.1f} ± {np.std(each, ddof=1):.1f}"] * 2]
 

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from half_space import jkr_force
 
-from icha.asperity.cohesive_zone import MAX_STRENGTH_NUMBER
 from icha.asperity.material import Material
-from validation.one_asperity import hertz_asperity, one_asperity, resolving_grid
+
+pytest.importorskip("tamaas", reason="`make tamaas` installs Tamaas")
+from validation.one_asperity import MAX_STRENGTH_NUMBER, hertz_asperity, one_asperity, resolving_grid
 
 PERIOD = 10.0
 

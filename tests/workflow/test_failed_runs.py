@@ -107,7 +107,7 @@ def test_the_verdict_lists_the_failed_run_and_the_others_are_used(sweep, dataset
     assert glue.sizes["snapshot"] == glue.sizes["spot"] == 0
     np.testing.assert_array_equal(glue["nominal_pressure"].values, broken["nominal_pressure"].values)
 
-    check_results(file, [], tmp_path / "checks.json", labels=labels, solution_labels=[])
+    check_results(file, tmp_path / "checks.json", labels=labels)
     failed = [check for check in read_checks(tmp_path / "checks.json") if not check.passed]
     assert [(check.subject, check.description) for check in failed] == [("sticky/rough/seed1/slope1/glue", reason)]
     with pytest.raises(ValueError) as verdict:

@@ -16,7 +16,6 @@ from conftest import REPOSITORY, SMOKE, copy_project, snakemake
 
 from icha.contact.models import MODELS
 
-BESIDE_RUNS = {"reference", "boundary_elements", "boundary_element_loop"}
 RUNS_AND_AFTER = {
     "run",
     "campaign_dataset",
@@ -107,14 +106,13 @@ def test_a_new_statement_runs_the_jobs_that_use_its_module(path, rules, some, ow
     ("changes", "some", "without"),
     [
         ({"name: ICHA developers": "name: A team"},
-         {"configuration": 1, "campaign_dataset": 1, "report_page": 1}, {"surface", "run", *BESIDE_RUNS}),
+         {"configuration": 1, "campaign_dataset": 1, "report_page": 1}, {"surface", "run", "reference"}),
         ({"license: CC-BY-4.0": "license: CC0-1.0"}, {"run": 27, "surface": 3, "campaign_dataset": 1}, set()),
         ({"25 MPa": "25000 kPa", "fig1_jkr: {}": "fig1_jkr: {tabor_parameter: 4}"},
          {"configuration": 1, "figure": 1, "report_page": 1}, {"run", "surface"}),
         # The references contain curves of Fuller & Tabor for each material.
-        ({"2 mJ/m^2": "3 mJ/m^2", "refinement: 2": "refinement: 3"},
-         {"run": 3 + 1, "reference": 1, "boundary_elements": 4}, {"surface"}),
-        ({"seeds: [1, 2]": "seeds: [1, 2, 3]"}, {"surface": 1, "run": 3 + 3, "boundary_elements": 3}, set()),
+        ({"2 mJ/m^2": "3 mJ/m^2"}, {"run": 3 + 1, "reference": 1}, {"surface"}),
+        ({"seeds: [1, 2]": "seeds: [1, 2, 3]"}, {"surface": 1, "run": 3 + 3}, set()),
     ],
 )  # fmt: skip
 def test_a_changed_value_runs_the_jobs_that_use_it(changes, some, without, own, edit):
@@ -123,17 +121,14 @@ def test_a_changed_value_runs_the_jobs_that_use_it(changes, some, without, own, 
     jobs, messages = planned(own)
     assert some.items() <= jobs.items() and not without & set(jobs)
     if "seeds: [1, 2]" in changes:
-        assert all("seed 3" in each for each in messages if each.startswith(("Surface", "Sweep", "Boundary")))
+        assert all("seed 3" in each for each in messages if each.startswith(("Surface", "Sweep")))
 
 
-def test_published_points_run_references_and_a_lost_solution_is_computed_again(own, edit):
+def test_published_points_run_references(own, edit):
     edit("icha/references/literature.json", "0.185", "0.186")
-    lost = own / "results/smoke/references/boundary_elements/adhesive/challenge/seed2/slope1/cmc_300nm/p0.01.nc"
-    aside = lost.rename(lost.with_suffix(".aside"))
     jobs, messages = planned(own)
-    aside.rename(lost)
     assert {"reference", "figure", "report_page"} <= set(jobs) and "Figure fig2_area_and_gap" in messages
-    assert jobs["boundary_elements"] == 1 and "run" not in jobs
+    assert "run" not in jobs
 
 
 @pytest.fixture
@@ -147,7 +142,7 @@ def fingerprint(monkeypatch):
 
 
 # Scripts that take long.
-EXPENSIVE = {"make_surface", "run_sweep", "make_references", "solve_boundary_elements", "follow_boundary_elements"}
+EXPENSIVE = {"make_surface", "run_sweep", "make_references"}
 
 
 def test_fingerprints_contain_the_modules_that_a_script_uses(fingerprint):
@@ -162,8 +157,6 @@ def test_fingerprints_contain_the_modules_that_a_script_uses(fingerprint):
         "equilibrium/newton": {"run_sweep"},
         "asperity/jkr": {"run_sweep", "make_references"},
         "simulation": {"run_sweep"},
-        # Solutions at finite ranges do not depend on the asperity model.
-        "references/finite_range": {"solve_boundary_elements", "follow_boundary_elements"},
         "references/persson": {"make_references"},
         "surfaces/spectrum": {"make_surface", "make_references"},
         "configuration/campaign": set(),

@@ -41,31 +41,21 @@ pathvars:
     results=RESULTS,
     logs=f"{RESULTS}/logs",
     benchmarks=f"{RESULTS}/benchmarks",
-    # One surface against one material.
-    contact="{surface}/seed{seed}/slope{slope}/{material}",
     # One run: one surface against one material in a study, with one model.
     run="{study}/{surface}/seed{seed}/slope{slope}/{model_folder}{material}",
 
 
 wildcard_constraints:
-    entry="[a-z0-9_-]+",
-    asperity="hertz|mu[0-9.]+",
     study="[a-z0-9_-]+",
     surface="[A-Za-z0-9_.+-]+",
     seed=r"\d+",
     slope=r"[0-9.e+-]+",
-    pressure=r"[0-9.e+-]+",
     material="[A-Za-z0-9_.+-]+",
-
-
-def labels_of(files, pattern, wildcards):
-    """Return the labels of a result file, found by the wildcards of its path."""
-    return files[f"{RESULTS}/{pattern}".format(**wildcards)]
 
 
 def case_of(wildcards):
     """Return the labels of the run with given wildcards."""
-    return labels_of(FILES.runs, results.RUN, wildcards)
+    return FILES.runs[f"{RESULTS}/{results.RUN}".format(**wildcards)]
 
 
 def by_case(value):

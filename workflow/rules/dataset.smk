@@ -118,7 +118,6 @@ rule model_error:
     input:
         campaign=FILES.dataset,
         runs=list(FILES.compared),
-        solutions=list(FILES.solutions),
     output:
         "<results>/aggregated/model_error.nc",
     log:
@@ -131,8 +130,7 @@ rule model_error:
         mem_mb=4000,
         runtime=30,
     params:
-        run_labels=[tuple(labels) for labels in FILES.compared.values()],
-        labels=[tuple(labels) for labels in FILES.solutions.values()],
+        labels=[tuple(labels) for labels in FILES.compared.values()],
         attributes=as_it_is(ATTRIBUTES),
         code=code_of("measure_model_error.py"),
     message:
@@ -190,8 +188,7 @@ rule sensitivity:
 
 rule checks:
     input:
-        dataset=FILES.dataset,
-        solutions=list(FILES.solutions),
+        FILES.dataset,
     output:
         FILES.checks,
     log:
@@ -205,7 +202,6 @@ rule checks:
         runtime=30,
     params:
         labels=[tuple(labels) for labels in FILES.runs.values()],
-        solution_labels=[tuple(labels) for labels in FILES.solutions.values()],
         code=code_of("check_results.py"),
     message:
         "Checks of the results"

@@ -1,8 +1,6 @@
 # report.html: figures, tables, parameters and checks on one page. The same data always give exactly the same page. The
 # times of jobs are in a separate table, run_times.tsv, because times differ between executions.
 
-from icha.planning.requirements import further_software
-
 
 rule report_page:
     input:
@@ -31,7 +29,6 @@ rule report_page:
         figures={name: options.studies_of(CAMPAIGN) for name, options in CAMPAIGN.figures.by_name().items()},
         citations=as_it_is([measurement.citation for measurement in CAMPAIGN.measurements.values()]),
         benchmarks=f"{RESULTS}/benchmarks",
-        further_software=further_software(CAMPAIGN),
         code=code_of("make_report.py", *(sorted({module_name(name) for name in CAMPAIGN.figures.by_name()}))),
     message:
         "Report"

@@ -23,7 +23,6 @@ def _solver_errors() -> list[type[Exception]]:
     names = {
         "icha.simulation": "ConvergenceError",
         "icha.contact.model": "NotConverged",
-        "icha.references.finite_range": "NotSolved",
     }
     return [getattr(sys.modules[module], name) for module, name in names.items() if module in sys.modules]
 

@@ -38,6 +38,5 @@ if "snakemake" in globals():
             files=linked,
             results=Path(page).parent,
             citations=params.citations,
-            further_software=params.further_software,
         )
         write_times(times, params.benchmarks)

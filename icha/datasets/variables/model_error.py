@@ -1,14 +1,6 @@
-"""Variables of the error of the asperity model. The dimensions that all variables have (labels, load) are not listed.
+"""Variables of the error of the asperity model, without the dimensions that all variables have (labels, load)."""
 
-In the limit of a short range of attraction, contact has a sharp edge. Therefore the raw, the corrected and the
-energetic area of boundary elements are equal in this limit.
-"""
-
-from icha.contact.models import MODELS, REFERENCE_MODEL
 from icha.datasets.variables.terms import Variable, bin_table, read_tables
-
-# Values of the attribute `truth` of an entry: the reference with which the asperity model is compared.
-SHORT_RANGE, FINITE_RANGE = MODELS[REFERENCE_MODEL].words, "boundary elements at finite range"
 
 ASKED = Variable(("reduced_pressure",), "1", "target of the reduced pressure, p/(E* h'rms)", coordinate=True)
 _OF_SNAPSHOTS = ("gap_distribution_distance", "pressure_distribution_distance", "gap_density", "pressure_density")
