@@ -39,6 +39,8 @@ PERIMETER = 0.7
 # Weights of the perimeter and of the width of the front in the reported area, fitted to patches between Hertz and JKR.
 # Smallest reported area of a cell, divided by its fraction.
 _EDGE, _FRONT_WIDTH, _SMALLEST_SHARE = 0.236, 1.115, 0.02
+# Largest part of the grid that discs of new contact close at once.
+_MOST_CLOSED = 0.5
 # Rounds in which fractions of neighbours follow each other: for rates, and for each step. Each leaves about a tenth of
 # the error.
 _ROUNDS, _ROUNDS_OF_STEP = 5, 2
@@ -298,16 +300,28 @@ class ShortRange:
         return np.union1d(self.summits[near & open_cells[self.summits]], touching)
 
     def closing(self, cells: np.ndarray, grid: int) -> np.ndarray:
-        """Return the cells that close, (m,) int, if some cells, (k,) int, come into contact: discs around summits."""
-        chosen = np.isin(self.summits, cells)
-        closed = np.zeros((grid, grid), bool)
+        """Return the cells that close, (m,) int, if some cells, (k,) int, come into contact: discs around summits.
+
+        Smaller discs close if they cover more than half of the grid: a given mean separation needs room for the gap.
+        """
+        chosen, largest = np.isin(self.summits, cells), 0.25 * grid
+        closed = self._discs(self.summits[chosen], np.minimum(self.radius[chosen], largest), grid)
+        while largest > 1 and closed.mean() > _MOST_CLOSED:
+            largest /= 2
+            closed = self._discs(self.summits[chosen], np.minimum(self.radius[chosen], largest), grid)
         closed.ravel()[cells] = True
-        for cell, radius in zip(self.summits[chosen], np.minimum(self.radius[chosen], 0.25 * grid), strict=True):
+        return np.flatnonzero(closed)
+
+    @staticmethod
+    def _discs(cells, radii, grid):
+        """Return a mask, (n, n), of discs around some cells, (k,) int; the grid is periodic."""
+        closed = np.zeros((grid, grid), bool)
+        for cell, radius in zip(cells, radii, strict=True):
             offset = np.arange(-int(radius), int(radius) + 1)
             rows, columns = np.nonzero(np.hypot(offset[:, None], offset) <= radius)
             row, column = divmod(int(cell), grid)
             closed[(row + offset[rows]) % grid, (column + offset[columns]) % grid] = True
-        return np.flatnonzero(closed)
+        return closed
 
     def tangent(self, bonds: Bonds, fraction: np.ndarray, grid: int) -> Tangent:
         """Return the tangent of the law at given fractions, (k,)."""
