@@ -210,13 +210,14 @@ class Axis(NamedTuple):
     factor: float
 
 
-def physical_units(dataset: xr.Dataset) -> tuple[Axis, Axis]:
-    """Return the axes of nominal pressure and mean gap in units with prefixes, for the runs of a study."""
+def physical_units(dataset: xr.Dataset, gap_name: str = "mean_gap") -> tuple[Axis, Axis]:
+    """Return the axes of nominal pressure and mean gap, or mean separation, in units with prefixes, for a study."""
     (pressure, pressure_unit), (gap, gap_unit) = (
         choose_unit(float(np.abs(dataset[name]).max()), unit)
-        for name, unit in (("nominal_pressure", "Pa"), ("mean_gap", "m"))
+        for name, unit in (("nominal_pressure", "Pa"), (gap_name, "m"))
     )
-    return Axis(f"pressure  $p$ ({pressure_unit})", pressure), Axis(f"mean gap ({gap_unit})", gap)
+    words = gap_name.replace("_", " ")
+    return Axis(f"pressure  $p$ ({pressure_unit})", pressure), Axis(f"{words} ({gap_unit})", gap)
 
 
 def physical_points(name: str, pressure: Axis, factor: float = 1.0) -> Points:

@@ -167,7 +167,7 @@ class UnitsFigure(FigureOptions):
     units: Literal["reduced", "physical"] = Field(
         default="reduced",
         description="`reduced`: loads in units of E* h'rms, separations in units of the rms height. `physical`: "
-        "nominal pressures in Pa and mean gaps in m, with prefixes.",
+        "nominal pressures in Pa, and mean gaps (figure 13: mean separations) in m, with prefixes.",
     )
 
     def arguments(self, campaign: Campaign) -> dict[str, Any]:

@@ -112,7 +112,7 @@ def figure(
     looks = looks_of_studies(campaign, [study], contacts)
     pressure, gap = Axis(PRESSURE_LABEL, 1.0), Axis(SEPARATION_LABEL, 1.0)
     if units == "physical":
-        pressure, gap = physical_units(campaign[study].to_dataset())
+        pressure, gap = physical_units(campaign[study].to_dataset(), "mean_separation")
     drawn = []
     for (labels, run), contact in zip(runs, contacts, strict=True):
         look = looks.look(contact, applicable=select.is_good_loop(run), model=labels.model)

@@ -12,7 +12,7 @@ from icha.checks.findings import IDENTITY_LIMIT
 from icha.datasets.campaign import loading_stops, reduced_gap, run_place, runs_of_status, select_run
 from icha.datasets.labels import LABELS, RunLabels, slopes_of
 from icha.datasets.variables.campaign import BEYOND_MODEL, COMPUTED_RUNS, FAILED_RUNS, LOADED_RUNS, MISSING, RAGGED
-from icha.figures.select import path_steps
+from icha.figures.select import has_shape, path_steps
 from icha.report.template import MOST_ROWS, format_mean, format_range, format_scientific
 from icha.support.formatting import choose_unit, format_quantity
 
@@ -68,6 +68,7 @@ def summarise_study(campaign: xr.DataTree, name: str) -> dict:
         "axes": axes,
         # For a free square, the mean separation differs from the mean gap (`reduced_gap`).
         "free": bool((dataset["boundary"] == "free").any()),
+        "shaped": has_shape(dataset),
         "materials": [_material(dataset.sel(material=material)) for material in axes["material"][:MOST_ROWS]],
         "runs": [_run(labels, run) for labels, run in runs],
         "table": _table(runs),

@@ -74,6 +74,12 @@ def test_fig13_draws_loading_unloading_and_the_pull_off():
     assert {"loading", "unloading", "pull-off"} <= set(legend(figure))
 
 
+def test_fig13_in_physical_units_has_separations():
+    """On a free square, the mean separation is not the mean gap."""
+    left = fig13_loops.figure(one(), study="one", units="physical").axes[0]
+    assert left.get_xlabel().startswith("mean separation (")
+
+
 def test_fig13_follows_the_exact_law_between_distant_states():
     contact = separate.Asperities(separate.MATERIALS["sticky"])
     labels = RunLabels("one", "asperities", "rough", 1, 1.0, "sticky")
