@@ -14,6 +14,9 @@ from scipy.optimize import least_squares
 from icha.references.indentation import sphere_contact
 from icha.support.rules import CONTACT_MODULUS, LENGTH, SURFACE_ENERGY
 
+# First and last root of the work of adhesion at which fits start, in the unit of the largest force, and their number.
+_STARTS = 0.1, 1.2, 24
+
 
 class JKRFit(NamedTuple):
     """Result of a fit.
@@ -96,8 +99,10 @@ def fit_work_of_adhesion(
         law = a**3 if indentation is None else sphere_contact(a, radius, fitted_modulus, work).indentation
         return (law - data) / scale
 
-    start = [math.sqrt(max(-force.min(), 1e-2 * force_scale) / force_scale), 0.0][:unknowns]
-    found = least_squares(residuals, start, x_scale=1.0, xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    # The sum has several minima: one may be where the tension of a state is the pull-off force of the law.
+    starts = [[root, 0.0][:unknowns] for root in np.linspace(*_STARTS)]
+    fits = [least_squares(residuals, start, x_scale=1.0, xtol=1e-14, ftol=1e-14, gtol=1e-14) for start in starts]
+    found = min(fits, key=lambda fit: fit.cost)
     return JKRFit(*parameters(found.x), float(np.sqrt(np.mean(found.fun**2))))
 
 

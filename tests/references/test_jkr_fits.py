@@ -51,6 +51,23 @@ def test_fit_is_a_minimum_of_the_squared_differences_of_cubed_radii():
         assert misfit(factor * fit.work_of_adhesion, other * fit.contact_modulus) > least
 
 
+def test_fit_is_the_lowest_of_several_minima():
+    """As on rough spheres, the contact is smaller in tension than that of a smooth sphere with the same pull-off."""
+    part = np.linspace(1, 0, 40)
+    force = -1.5 * math.pi * 0.05 * RADIUS * part
+
+    def cubed_radius(work):
+        unit = 3 * math.pi * work * RADIUS
+        return 0.75 * RADIUS / MODULUS * (force + unit + np.sqrt(np.maximum(2 * unit * force + unit**2, 0.0)))
+
+    data = cubed_radius(0.05) * (1 - 0.3 * part)
+    fit = fit_work_of_adhesion(force, RADIUS, contact_radius=np.cbrt(data), contact_modulus=MODULUS)
+    misfits = [
+        math.sqrt(np.mean((cubed_radius(work) - data) ** 2)) / data.max() for work in np.linspace(0.005, 0.1, 3000)
+    ]
+    assert fit.misfit <= min(misfits) * (1 + 1e-6)
+
+
 @pytest.mark.parametrize("quantity", ["contact_radius", "indentation"])
 def test_loading_and_unloading_are_fitted_separately(quantity):
     loading, unloading = stable_states(0.03, smallest=1.7, largest=9.0), stable_states(0.08)
