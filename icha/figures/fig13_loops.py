@@ -161,7 +161,8 @@ def figure(
 
 def _in_units(run, pressure, separation):
     """Return a run with the variables `load` and `separation`, reduced values times two factors, and their `slope`."""
-    load, apart = run["reduced_pressure"] * pressure, run["reduced_separation"] * separation
+    # The area of a loop is the loss only against the mean separation, which is not the mean gap of a free square.
+    load, apart = run["reduced_pressure"] * pressure, run["mean_separation"] / run["unit_height"] * separation
     unit = run["contact_modulus"] * run["unit_slope"] / run["unit_height"]
     run = run.assign(load=load, separation=apart)
     return run.assign(slope=-run["contact_stiffness"] / unit * pressure / separation)
