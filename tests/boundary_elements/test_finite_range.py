@@ -1,0 +1,106 @@
+"""Boundary elements at a range of attraction that the grid resolves."""
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+import icha
+from icha.boundary_elements.contact import contact_of
+from icha.boundary_elements.laws import Cohesive
+from icha.checks.run import check_run
+from icha.contact.attraction import FINITE_RANGE, SHORT_RANGE, attraction_on, resolving_spacing
+from validation.surfaces import wave
+
+MODULUS, ENERGY, RADIUS = 1e6, 0.05, 1e-4
+# Contact radius and indentation of a sphere with adhesion, in the units of Johnson, Kendall and Roberts, m.
+LENGTH, UNIT = (ENERGY * RADIUS**2 / MODULUS) ** (1 / 3), (ENERGY**2 * RADIUS / MODULUS**2) ** (1 / 3)
+
+
+def sphere_loop(tabor, grid, side):
+    """Press a paraboloid on a square with a side in units of LENGTH, and pull it off."""
+    shape = icha.Paraboloid((RADIUS, RADIUS))
+    surface = icha.Surface(np.zeros((grid, grid)), side * LENGTH, "free", shape)
+    material = icha.Material(MODULUS, ENERGY, UNIT / tabor)
+    path = icha.Path(indentations=[0.3 * UNIT], unload=True, snapshots=[])
+    return icha.simulate(surface, material, path, model="boundary_elements")
+
+
+@pytest.mark.parametrize(("tabor", "grid", "side", "expected"), [(0.3, 48, 10, 1.824), (1.0, 40, 8, 1.615)])
+def test_pull_off_of_a_sphere_is_between_jkr_and_dmt(tabor, grid, side, expected):
+    """The values are those of the same law on finer grids, with limits of 1.5 (JKR) and 2 (DMT)."""
+    run = sphere_loop(tabor, grid, side)
+    assert run.attrs["attraction"] == FINITE_RANGE
+    assert float(run.pull_off_force) / (np.pi * ENERGY * RADIUS) == pytest.approx(expected, rel=5e-3)
+    assert not [check for check in check_run(run) if not check.passed]
+    if tabor < 0.5:
+        # Without a jump no energy is lost.
+        assert abs(float(run.hysteresis_loss)) < 1e-3 * float(abs(run.work).max())
+
+
+def test_rough_contact_has_the_energy_that_an_independent_minimiser_finds():
+    grid = 48
+    surface = icha.SelfAffineSpectrum(1e-4, 2e-5, 1e-4 / 6, 0.8, 0.1).realise(grid, 1)
+    energy = 0.002
+    tabor = (energy**2 * surface.summit_radius / MODULUS**2) ** (1 / 3) / 0.3
+    material, loads = icha.Material(MODULUS, energy, tabor), [0.003, 0.03]
+    contact = contact_of(surface, material)
+    assert isinstance(contact.attraction, Cohesive)
+    run = icha.simulate(surface, material, icha.Path(loads, snapshots=[]), model="boundary_elements")
+    h, length, reach = contact.cell_heights, contact.attraction.adhesion_length, contact.attraction.reach
+    for k in range(len(loads)):
+        load = float(run.nominal_pressure[k]) / MODULUS
+
+        def energy_and_gradient(gap, load=load):
+            gap = gap.reshape(h.shape)
+            pressure, f = contact.space.pressure(gap + h), np.clip(1 - gap / reach, 0, 1)
+            energy = 0.5 * np.vdot(gap + h, pressure) - length * np.sum(f**2) + load * gap.sum()
+            return energy, (pressure + load + 2 * length / reach * f).ravel()
+
+        start = np.maximum(float(run.mean_separation[k]) / contact.spacing - h, 0).ravel()
+        limits, options = [(0, None)] * h.size, {"maxiter": 5000, "ftol": 1e-16, "gtol": 1e-10, "maxcor": 50}
+        found = minimize(energy_and_gradient, start, jac=True, method="L-BFGS-B", bounds=limits, options=options)
+        assert float(run.mean_separation[k]) / contact.spacing == pytest.approx(found.x.mean(), rel=1e-6)
+
+
+def test_load_and_separation_give_the_same_state():
+    surface = icha.SelfAffineSpectrum(1e-4, 2e-5, 1e-4 / 6, 0.8, 0.1).realise(48, 2)
+    contact = contact_of(surface, icha.Material(MODULUS, 0.002, 2e-6))
+    by_load = icha.simulate(
+        surface, icha.Material(MODULUS, 0.002, 2e-6), icha.Path([0.02], snapshots=[]), model="boundary_elements"
+    )
+    path = icha.Path(mean_separations=[float(by_load.mean_separation[-1])], snapshots=[])
+    by_separation = icha.simulate(surface, icha.Material(MODULUS, 0.002, 2e-6), path, model="boundary_elements")
+    assert contact.attraction.name == FINITE_RANGE
+    for name in ("nominal_pressure", "contact_area_fraction", "energetic_area_fraction"):
+        assert float(by_separation[name][-1]) == pytest.approx(float(by_load[name][-1]), rel=1e-6)
+
+
+def test_full_contact_of_a_resolved_strength_opens_at_this_strength():
+    """Johnson's wave: contact is complete at p*, and opens where the trough bears the strength, p*/2."""
+    surface, top = wave(96, 1e-3, 1e-5), np.pi * MODULUS * 1e-5 / 1e-3
+    energy = (0.2 * np.pi * 1e-2 / np.sqrt(2)) ** 2 * MODULUS * 1e-3
+    material = icha.Material(MODULUS, energy, 2 * 16 * energy / (9 * np.sqrt(3) * top))
+    assert material.interface_strength == pytest.approx(top / 2)
+    path = icha.Path(pressures=[0.1 * top, 1.2 * top], unload=True, snapshots=[])
+    run = icha.simulate(surface, material, path, model="boundary_elements")
+    full = (run.leg.values == 1) & (run.contact_area_fraction.values == 1)
+    assert run.nominal_pressure.values[full].min() == pytest.approx(0.5 * top, rel=1e-2)
+
+
+def test_a_grid_resolves_the_range_up_to_the_resolving_spacing():
+    material = icha.Material(MODULUS, ENERGY, UNIT)
+    spacing = resolving_spacing(material)
+    assert attraction_on(material, 0.99 * spacing) == FINITE_RANGE
+    assert attraction_on(material, 1.01 * spacing) == SHORT_RANGE
+
+
+def test_contact_of_ridges_leaves_room_for_the_gap():
+    """The discs of new contact at all summits of a ridge would cover the whole surface."""
+    x, y = np.meshgrid(np.arange(128), np.arange(128))
+    length = 1e-3 / 5
+    surface = icha.Surface(length / 100 * np.cos(2 * np.pi * (3 * x + 4 * y) / 128 + 0.37), 1e-3)
+    top = np.pi * MODULUS / 100
+    energy = (0.1 * np.pi / 100 / np.sqrt(2)) ** 2 * MODULUS * length
+    material = icha.Material(MODULUS, energy, 0.05 * 16 * energy / (9 * np.sqrt(3) * top))
+    run = icha.simulate(surface, material, icha.Path(pressures=[0.1 * top], snapshots=[]), model="boundary_elements")
+    assert 0.2 < float(run.contact_area_fraction[-1]) < 0.35
