@@ -16,12 +16,7 @@ from icha.asperity.material import Material
 from icha.boundary_elements import minimise as solver
 from icha.boundary_elements.elastic import HalfSpace
 from icha.boundary_elements.full_contact import ROUNDING, FullContactProblem
-from icha.boundary_elements.laws import (
-    Cohesive,
-    NoAttraction,
-    ShortRange,
-    average,
-)
+from icha.boundary_elements.laws import Cohesive, NoAttraction, ShortRange, average
 from icha.boundary_elements.observables import PatchObservables
 from icha.boundary_elements.patches import (
     BEYOND_EDGES,
@@ -370,7 +365,7 @@ class BoundaryElements(FullContactProblem):
         cells = np.flatnonzero(touching)
         mean = found.position.mean() - self.space.mean_compliance * found.load
         fraction = found.fraction.ravel()[cells] if self.adhesive else np.ones(len(cells))
-        neighbours = average(found.fraction).ravel()[cells] if self.adhesive else np.zeros(len(cells))
+        neighbours = average(found.fraction).ravel()[cells] if self.divides_cells else np.zeros(len(cells))
         pressure = found.pressure.ravel()[cells] * self.contact_modulus
         state = CellState(
             mean * self.spacing,

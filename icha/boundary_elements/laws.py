@@ -13,8 +13,7 @@ reach. The sum of the fractions overestimates the contact radius by a constant p
     A = sum f - b sum f (1 - w*f),   b = PERIMETER, w a Gaussian stencil,
 
 subtracts a term in proportion to the perimeter. This term lowers the work W of a cell at convex fronts:
-W = dgamma (1 - b + 2 b w*f). The term with w*f is concave in f, so its tangent at the present fractions is never below
-it: a step at constant W that lowers the energy lowers the true energy by at least as much.
+W = dgamma (1 - b + 2 b w*f). So works and fractions depend on each other, and follow each other in a few rounds.
 
 Lengths are in units of the cell size, pressures in E*.
 """

@@ -65,7 +65,8 @@ class Equilibrium:
     pressure : (n, n), pressure on each cell, in E*.
     load : mean pressure P of the grid, in E*.
     held : (n, n) bool, cells whose gap is zero and stays zero.
-    residual : largest residual pressure, relative to the largest pressure.
+    residual : largest residual pressure, relative to the peak tension of the bonds or, without attraction, to the
+        largest pressure.
     gap_residual : largest displacement by the residual pressures.
     pending : number of cells within reach of the attraction that stay open.
     iterations : number of iterations.
@@ -138,16 +139,14 @@ def minimise(
         z = _restrict(z, ~held, control)
         d = _conjugate(z, r, last, ~held, control)
         # Step along the direction; a step that would raise the energy is shortened.
-        line = _Line(space, law, heights, control, now, r, d)
-        found = line.search()
+        found = _Line(space, law, heights, control, now, r, d).search()
         if found is None:
             refused, last = refused + 1, None
             if refused > _REFUSALS:
                 raise NotConverged(f"no step lowers the energy; residual {error:.1e}")
             now = _Point.of(law, now.position, now.gap, now.pressure, now.bonds)
             continue
-        refused, last = 0, (d, r, float(np.vdot(r, z)))
-        now = found
+        now, refused, last = found, 0, (d, r, float(np.vdot(r, z)))
     # The end of the loop.
     raise NotConverged(f"residual {error:.1e} after {_MOST} iterations")
 
@@ -240,7 +239,7 @@ class _Line:
                     return best
                 length *= _SHORTER
             else:
-                length = min(length * (1 / (1 - share) if share < 1 - 1 / _FURTHER else _FURTHER), longest)
+                length = min(length / max(1 - share, 1 / _FURTHER), longest)
         return None
 
     def _curvature(self, stiff_d):

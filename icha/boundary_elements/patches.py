@@ -23,11 +23,12 @@ class CellState:
     cells : (k,) int, flat indices of the grid cells in contact, ascending.
     fraction : (k,), fraction of contact f of each cell, 0 < f <= 1: tension over strength at the front.
     pressure : (k,), force on each cell divided by the area of the whole cell, Pa; negative in tension.
-    mean_fraction : (k,), Gaussian average of the fractions of each cell and its neighbours; without adhesion not used.
+    mean_fraction : (k,), Gaussian average of the fractions of each cell and its neighbours; used at a short range.
     pressure_slope, area_slope : slopes dp/du of nominal pressure (Pa/m) and of area fraction (1/m), with moving fronts.
     rates : changes of the pressures in E*, (k,), when the separation increases by one cell size; None if unknown.
-    residual : largest residual pressure, relative to the largest pressure.
-    gap_residual : largest gap that the residual pressures would cause, m.
+    residual : largest residual pressure, relative to the peak tension of the bonds or, without attraction, to the
+        largest pressure.
+    gap_residual : largest displacement by the residual pressures, m.
     pending : number of cells within reach (of summits, or overlapping) that stay open, because contact is not stable.
     history : events of the path up to this state, one `Events` for each equilibrium with events.
     """
