@@ -109,19 +109,23 @@ def minimise(
     """
     now, last, refused = _start(space, law, heights, position, fraction, control), None, 0
     closed, opened, pending = np.zeros(heights.shape, bool), np.zeros(heights.shape, bool), 0
+    # Cells inside a short-ranged contact of a calm state; cells that close for a moment must be free to open.
+    locked = ~with_neighbours(fraction < 1) if law.holds_inside else opened
     # The loop of the solver.
     for iteration in range(_MOST):
-        # Residual pressures; a cell is held closed under pressure, and inside a short-ranged contact.
+        # Residual pressures; a cell is held closed under pressure, and where it is locked.
         is_open = now.gap > 0
         load = _load(space, control, now, is_open)
-        r, inside = now.force - load, opened
+        r, inside = now.force - load, locked
         if law.holds_inside:
-            inside = ~(with_neighbours(is_open) | opened)
+            inside = locked & ~(with_neighbours(is_open) | opened)
         held = ~is_open & (r <= 0) | inside
         r *= ~held
         largest = law.straight_strength or max(float(np.abs(now.pressure + load).max()), tolerance / _CALM)
         error = float(np.abs(r).max()) / largest
         if error <= _CALM:
+            if law.holds_inside:
+                locked = ~with_neighbours(is_open)
             # Each cell closes, and opens, at most once, so that the number of changes is limited.
             closing = law.within_reach(now.gap, now.field)
             opening, pending = inside & (now.pressure + load < -law.strength), len(closing)

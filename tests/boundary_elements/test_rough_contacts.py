@@ -48,6 +48,17 @@ def test_a_stop_is_the_same_in_five_and_in_fifty_steps():
     assert abs(few["pressure_error"]) <= 1e-6 and abs(few["area_error"]) <= 1e-6 and few["fraction_error"] <= 1e-4
 
 
+def test_a_load_is_met_with_the_same_area_in_one_step_and_in_several():
+    """In a long step, cells may close for a moment, and must be free to open again."""
+    surface = icha.SelfAffineSpectrum(1e-4, 1e-4, 1e-4 / 24, 0.8, 1.0).realise(192, 1)
+    material = icha.Material(1e6, 1e-4, 1e-10)
+    areas = []
+    for loads in ([0.01, 0.1], np.geomspace(0.01, 0.1, 6).tolist()):
+        run = icha.simulate(surface, material, icha.Path(loads, snapshots=[]), model="boundary_elements")
+        areas.append(float(run.contact_area_fraction[-1]))
+    assert areas[0] == pytest.approx(areas[1], rel=1e-5)
+
+
 def test_loop_without_adhesion_gives_all_work_back():
     """But for the error of the integral of the pressure, whose slope jumps with every cell that closes."""
     row = loop(rough(64, 8), 1e-2, 0.2, HARD)
