@@ -109,11 +109,11 @@ class PatchObservables:
         At a finite range, it contains the tension on cells that attract across a gap.
         """
         edges_of_bins = PRESSURE_BINS * self.contact.pressure_unit
-        if self.contact.divides_cells:
-            # The force on a cell acts on its fraction in contact. One factor scales all fractions to the contact area.
-            weight = state.fraction * (np.sum(areas) / (np.sum(state.fraction) or 1.0))
-        else:
-            weight = np.where(areas > 0, areas, 1.0)
+        # The force on a cell acts on its fraction in contact. One factor scales all fractions to the contact area.
+        # Tension across a gap acts on the whole cell.
+        touching = areas > 0
+        scale = np.sum(areas) / (np.sum(state.fraction[touching]) or 1.0)
+        weight = np.where(touching, scale * state.fraction, 1.0)
         pressure = state.pressure / weight
         counted = np.clip(pressure, edges_of_bins[0], edges_of_bins[-1])
         content, _ = np.histogram(counted, edges_of_bins, weights=weight)
