@@ -15,7 +15,15 @@ import xarray as xr
 
 from icha.analysis.control_variates import PROBABILITY, estimate_quantity
 from icha.analysis.grid_error import cells_of_length, error_beyond, nodes_of
-from icha.analysis.left_out import NOT_POSITIVE, WITHOUT_RUN, causes_of_runs, find_left_out, varied_parameters
+from icha.analysis.left_out import (
+    ENDED_EARLY,
+    NO_FIT,
+    NOT_POSITIVE,
+    WITHOUT_RUN,
+    causes_of_runs,
+    find_left_out,
+    varied_parameters,
+)
 from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
 from icha.datasets.attributes import DERIVED, combine_attributes
 from icha.datasets.build import build_dataset, stack_rows
@@ -237,5 +245,7 @@ def values_of(data, model, quantity, kind, target) -> Values | None:
         same = np.isclose(runs["step_target"], target, rtol=1e-9, atol=0)
         values = values.where(loading_stops(runs) & (runs["step_kind"] == kind) & same).max("step")
     causes = causes_of_runs(runs, values, of_loss=quantity in OF_LOSS)
+    if quantity.startswith("work_of_adhesion"):
+        causes = causes.where((causes != ENDED_EARLY) | runs["pull_off_force"].isnull(), NO_FIT)
     shown = (each.transpose(*DIMS).values for each in (values.where(causes == ""), causes))
     return Values(*shown, data["seed"].values.tolist())

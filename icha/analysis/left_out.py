@@ -44,11 +44,12 @@ AVERAGED_APART = "averaged separately"
 LOSS_FAILED, ENDED_EARLY = "failed a check of the loss", "ended before this state"
 ENDED_FIRST = "ended before the first target"
 NOT_APPLICABLE, NOT_POSITIVE, INFINITE = "outside the range of the model", "without a positive value", "in full contact"
+NO_FIT = "without a fit of JKR"
 _OF_STATUS = {INCOMPLETE: NOT_FINISHED, FAILED_CHECKS: FAILED, MISSING: NOT_COMPUTED}
 WITHOUT_RUN = (NOT_COMPUTED, NOT_REQUESTED)
 # Causes in the physics of a run, which depends on everything that was varied, and thus on the seed. Whether a run fails
 # in another way depends on a parameter if this parameter separates the failed runs from the others.
-_PHYSICS = (LOSS_FAILED, ENDED_EARLY, ENDED_FIRST, NOT_APPLICABLE, NOT_POSITIVE, INFINITE, AVERAGED_APART)
+_PHYSICS = (LOSS_FAILED, ENDED_EARLY, ENDED_FIRST, NOT_APPLICABLE, NOT_POSITIVE, INFINITE, NO_FIT, AVERAGED_APART)
 
 
 class LeftOut(NamedTuple):

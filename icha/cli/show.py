@@ -117,15 +117,19 @@ def _print_run(run, file: Path) -> None:
 
 
 def _indenter_test(run) -> str:
-    """Return the pull-off force of an indenter, its ratio to JKR, and the works of adhesion of the fits, as text."""
+    """Return the pull-off force of an indenter, its ratio to JKR, and works of adhesion or why a fit is missing."""
+    from icha.references.indenter_runs import BRANCHES, reason_without_fit
+
     parts = [f"pull-off force {format_quantity(float(run['pull_off_force']), 'N')}"]
     if "pull_off_force_over_jkr" in run:
         parts[0] += f" ({float(run['pull_off_force_over_jkr']):.4g} of JKR)"
     elif "pull_off_force_over_theory" in run:
         parts[0] += f" ({float(run['pull_off_force_over_theory']):.4g} of the theory of the smooth shape)"
-    for branch in ("approach", "retraction"):
-        if (name := f"work_of_adhesion_{branch}") in run:
-            parts.append(f"{branch} {format_quantity(float(run[name]), 'J/m²')}")
+    if "pull_off_force_over_jkr" in run:
+        for branch in BRANCHES:
+            reason = reason_without_fit(run, branch)
+            work = f"no fit ({reason})" if reason else format_quantity(float(run[f"work_of_adhesion_{branch}"]), "J/m²")
+            parts.append(f"{branch} {work}")
     return ", ".join(parts)
 
 

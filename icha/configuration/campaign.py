@@ -180,6 +180,10 @@ class Campaign(Section):
         """Return whether a surface is a square with free edges; False for periodic surfaces."""
         return self.surfaces[surface].free
 
+    def is_flat(self, surface: str) -> bool:
+        """Return whether a surface is nominally flat: it has no shape."""
+        return self.surfaces[surface].shape is None
+
     def grid(self, surface: str) -> int | None:
         """Return the number of nodes along a side of a surface; None if its file has not been read."""
         return getattr(self._grid_and_period(surface), "grid", None)
@@ -252,7 +256,7 @@ class Campaign(Section):
             each: self.materials[each.material].contact_modulus * each.rms_slope
             for each in known
             # The reduced pressure of a surface with a shape does not depend on its roughness.
-            if not is_unread(each.rms_slope) and self.surfaces[each.surface].shape is None
+            if not is_unread(each.rms_slope) and self.is_flat(each.surface)
         }
         forces = (pressure * sides[each.surface] ** 2 for each, pressure in units.items())
         return tuple(min(values, default=math.inf) for values in (units.values(), forces, sides.values()))

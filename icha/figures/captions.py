@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.contact.attraction import FINITE_RANGE, SHORT_RANGE
+from icha.contact.models import MODELS
 from icha.datasets.labels import LABELS, slopes_of
-from icha.figures.select import has_shape, lacks_sphere
+from icha.figures.select import has_shape, lacks_fit, lacks_sphere
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -53,13 +54,16 @@ def texts_of(figure: Figure, data: Mapping[str, object], studies: Sequence[str])
 
     Words are the names of the `data`, and words for the `studies` that are shown: materials that are `bare`, `adhesive`
     or `with and without adhesion`; `several surfaces`, `several slopes`, `bare at several slopes`, `adhesive at several
-    slopes`, `one seed`, `periodic` surfaces, `units of a shape`, runs `without a sphere`; and boundary
-    elements `in the limit`, `at finite range` or of `both ranges`.
+    slopes`, `one seed`, `periodic` surfaces, `units of a shape`, `first surface with a shape`, runs `without a sphere`
+    or `without a fit` of JKR; boundary elements `in the limit`, `at finite range` or of `both ranges`. Texts name `both
+    models`, or `only` one model.
     """
     from matplotlib.text import Text
 
     words = [*data, *(text.get_text() for text in figure.findobj(Text))]
     has_units = any(r"\mathrm{rms}" in word for word in words)
+    models = [model.words for model in MODELS.values() if any(word.startswith(model.words) for word in words)]
+    words += ["both models"] if len(models) > 1 else [f"only {model}" for model in models]
     campaign = data["campaign"].children if "campaign" in data else {}
     attractions: set[str] = set()
     for study in (campaign[name].to_dataset() for name in studies if name in campaign):
@@ -76,7 +80,9 @@ def texts_of(figure: Figure, data: Mapping[str, object], studies: Sequence[str])
             "one seed": study.sizes["seed"] == 1,
             "units of a shape": has_units and has_shape(study),
             "periodic": (study["boundary"] == "periodic").any(),
+            "first surface with a shape": has_shape(study.isel(surface=0)),
             "without a sphere": lacks_sphere(study),
+            "without a fit": lacks_fit(study),
         }
         words += [word for word, holds in conditions.items() if holds]
         attractions.update(study["attraction"].values.ravel() if "attraction" in study else ())

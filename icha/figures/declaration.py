@@ -52,9 +52,10 @@ def dataset_only(campaign: Campaign, options: FigureOptions, files: results.Resu
 
 
 def dataset_and_theories(campaign: Campaign, options: StudyFigure, files: results.ResultFiles) -> Inputs:
-    """Return the paths of the campaign dataset, and of the theories for the first surface of the study."""
-    theories = files.path(results.THEORIES, surface=campaign.studies[options.study].surfaces[0])
-    return {"campaign": files.path(results.DATASET), "references": theories}
+    """Return the paths of the campaign dataset, and of the theories for the study's first surface, if it is flat."""
+    surface = campaign.studies[options.study].surfaces[0]
+    theories = {"references": files.path(results.THEORIES, surface=surface)} if campaign.is_flat(surface) else {}
+    return {"campaign": files.path(results.DATASET)} | theories
 
 
 def dataset_and_model_error(campaign: Campaign, options: ComparedFigure, files: results.ResultFiles) -> Inputs:

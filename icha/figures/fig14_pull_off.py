@@ -99,10 +99,11 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
         _scale(ax, values)
         ax.set_ylabel(f"pull-off pressure ({unit})")
     slopes = sorted({point.labels.rms_slope for line in by_slope.values() for point in line})
-    scale = "log" if slopes[-1] > 3 * slopes[0] else "linear"
+    scale = "log" if slopes[-1] > 3 * slopes[0] > 0 else "linear"
     panels[0].set(xlabel=r"rms slope  $h′_{\mathrm{rms}}$", xscale=scale)
-    panels[0].set_xlim(slopes[0] / 1.25, slopes[-1] * 1.25)
-    panels[0].set_xticks(slopes, [f"{slope:g}" for slope in slopes])
+    room = 0.25 * (slopes[-1] or 1)  # a smooth shape has the slope 0
+    panels[0].set_xlim(slopes[0] / 1.25 if slopes[0] else -room, slopes[-1] + room)
+    panels[0].set_xticks(slopes, [f"{slope:.4g}" for slope in slopes])
     panels[0].xaxis.minorticks_off()
     if by_load:
         panels[1].set_xlabel(r"largest reduced pressure  $F/(E^{\ast}h′_{\mathrm{rms}}A_0)$")

@@ -12,7 +12,7 @@ from icha.contact.models import REFERENCE_MODEL
 from icha.figures.curves import cross_look
 from icha.figures.declaration import Campaign, Declaration, FigureOptions, problems_of_unloading
 from icha.figures.ensembles import Points, points_handles
-from icha.figures.looks import REFERENCE_NAME, legend_below, looks_of_studies, model_handle, pale
+from icha.figures.looks import ASPERITIES_NAME, REFERENCE_NAME, legend_below, looks_of_studies, model_handle, pale
 from icha.figures.select import ContactRuns, NothingToDraw, names_of_models, select_detached_lines
 from icha.figures.style import GREY, in_style, logarithmic_axes, new_panels
 from icha.support.values import Problem, list_of_names
@@ -81,7 +81,8 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
     fig, [(loss, parts)] = new_panels(3.1, width_ratios=(1.25, 1))
     handles, counts = _draw_losses(loss, sticky, truths, looks)
     if truths:
-        handles |= {REFERENCE_NAME: model_handle(REFERENCE_NAME)}
+        names = {ASPERITIES_NAME: looks.fill(), REFERENCE_NAME: {}}
+        handles |= {name: model_handle(name, **look) for name, look in names.items()}
     else:
         loss.set_title(", ".join(names_of_models(itertools.chain(*sticky.values()))), loc="right")
     shown = _draw_parts(parts, sticky, looks)

@@ -8,7 +8,7 @@ import numpy as np
 
 from icha.figures import select
 from icha.figures.declaration import Declaration
-from icha.figures.indenter_curves import IndenterFigure, first_run, select_series, theory_curves
+from icha.figures.indenter_curves import IndenterFigure, select_series, theory_curves
 from icha.figures.looks import BRANCH_DASHES, legend_below
 from icha.figures.style import BLACK, GREY, in_style, legend_handle, new_panels
 from icha.support.formatting import choose_unit
@@ -32,21 +32,27 @@ _MARGIN = 0.06
 
 @in_style
 def figure(campaign: xr.DataTree, *, study: str) -> Figure:
-    """Draw force against indentation for all runs of a study; many series have a panel each."""
+    """Draw force against indentation for all runs of a study, with the theories for each radius and material.
+
+    Series have a panel each if they are many, or if they differ in more than the rms height.
+    """
     series = select_series(campaign, study)
     runs = [run for each in series for run in each.runs.by_seed.values()]
     force, depth = (np.concatenate([run[name].values for run in runs]) for name in ("force", "indentation"))
     (per_newton, force_unit), (per_metre, depth_unit) = (
         choose_unit(float(np.abs(values).max()), unit) for values, unit in ((force, "N"), (depth, "m"))
     )
-    shown = [series] if len(series) <= _MOST_SERIES else [[each] for each in series]
+    together = len(series) <= _MOST_SERIES and not any(each.contact for each in series)
+    shown = [series] if together else [[each] for each in series]
     columns = min(len(shown), 2)
     rows = -(-len(shown) // columns)
     fig, panels = new_panels(2.7 * rows, rows, columns, width=3.55 * max(columns, 1.3), sharex=True, sharey=True)
     largest = max(float(run["contact_radius"].max()) for run in runs)
-    theories = theory_curves(first_run(series), 1.5 * largest)
+    theories = {}
     for ax, of_panel in zip(panels.ravel(), shown, strict=False):
-        for name, (x, y) in theories.items():
+        of_sphere = theory_curves(of_panel[0].first_run, 1.5 * largest)
+        theories |= of_sphere
+        for name, (x, y) in of_sphere.items():
             ax.plot(x * per_metre, y * per_newton, zorder=1, **_THEORIES[name])
         for each in of_panel:
             for run in each.runs.by_seed.values():

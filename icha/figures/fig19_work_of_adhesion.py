@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from icha.figures.declaration import Declaration
 from icha.figures.indenter_curves import IndenterFigure, select_series
-from icha.figures.looks import MATERIAL_COLOURS, legend_below
+from icha.figures.looks import distinct_colours, legend_below
 from icha.figures.select import NothingToDraw
-from icha.figures.style import GREY, ONE_COLUMN, in_style, legend_handle, new_figure
+from icha.figures.style import COLOURS, GREY, ONE_COLUMN, in_style, legend_handle, new_figure
 from icha.support.formatting import choose_unit
 
 if TYPE_CHECKING:
@@ -34,35 +35,36 @@ _MEAN = {"lw": 0.9, "ms": 5.0}
 
 @in_style
 def figure(campaign: xr.DataTree, *, study: str) -> Figure:
-    """Draw works of adhesion of fits and of pull-off, divided by the surface energy; lines join means over seeds."""
-    series = select_series(campaign, study)
+    """Draw works of adhesion of fits and of pull-off, divided by the surface energy.
+
+    Lines join means over seeds of series that differ only in their rms height.
+    """
+    series = select_series(campaign, study, only_jkr=True)
     if not any("pull_off_force_over_jkr" in run for each in series for run in each.runs.by_seed.values()):
         raise NothingToDraw(f"study {study}: no sphere with adhesion was pulled off; see the surfaces and materials")
     largest = max(float(run["rms_height"]) for each in series for run in each.runs.by_seed.values())
     scale, unit = choose_unit(largest, "m")
-    materials = list(dict.fromkeys(each.runs.labels.material for each in series))
+    contacts = list(dict.fromkeys(each.contact for each in series))
+    colours = distinct_colours(len(contacts))
     fig = new_figure(1.25 * ONE_COLUMN, 2.9)
     ax = fig.subplots()
-    for (quantity, (_, marker)), material in ((q, m) for q in _QUANTITIES.items() for m in materials):
-        groups = [each.runs for each in series if each.runs.labels.material == material]
-        colour = MATERIAL_COLOURS[list(_QUANTITIES).index(quantity) + 3 * materials.index(material)]
-        means = []
-        for group in groups:
+    handles = {name: legend_handle(color=colour, lw=4) for name, colour in zip(contacts, colours, strict=True) if name}
+    for (k, (quantity, (name, marker))), contact in itertools.product(enumerate(_QUANTITIES.items()), contacts):
+        # Colours distinguish the quantities, or surfaces and materials if there are several.
+        colour, means = colours[contacts.index(contact)] if contact else COLOURS[k], []
+        for group in (each.runs for each in series if each.contact == contact):
             points = [(float(run["rms_height"]) * scale, value) for run, value in _values(group, quantity)]
             if points:
                 ax.plot(*np.transpose(points), marker=marker, mec=colour, **_ONE_SEED)
                 means.append(np.mean(points, axis=0))
         if means:
             ax.plot(*np.transpose(means), marker=marker, color=colour, **_MEAN)
+            handles[name] = legend_handle(color=GREY if contact else colour, marker=marker, **_MEAN)
     ax.axhline(1, color=GREY, lw=0.6, zorder=0)
     ax.set(xlabel=f"rms height of the roughness ({unit})", ylabel=r"work of adhesion over $\Delta\gamma$")
     ax.margins(y=0.15)
-    handles = {}
-    for material in materials:
-        for quantity, (name, marker) in _QUANTITIES.items():
-            colour = MATERIAL_COLOURS[list(_QUANTITIES).index(quantity) + 3 * materials.index(material)]
-            words = f"{name}, {material}" if len(materials) > 1 else name
-            handles[words] = legend_handle(color=colour, marker=marker, **_MEAN)
+    if not largest:
+        ax.set_xticks([0])
     legend_below(fig, handles)
     return fig
 

@@ -51,7 +51,7 @@ def figure(
     Parameters
     ----------
     campaign : the campaign dataset.
-    references : theories and published results for the study's first surface (`icha.references.theories`), if any.
+    references : theories and published results for the study's first surface (`icha.references.theories`), if flat.
     units : "reduced" or "physical".
     """
     if units == "physical":

@@ -12,7 +12,7 @@ from icha.figures.curves import add_snapshot_legend, drop_rounding_errors, snaps
 from icha.figures.declaration import Declaration, SnapshotFigure
 from icha.figures.ensembles import draw_members, join_bins
 from icha.figures.looks import MODEL_MARKERS, REFERENCE_NAME, TRUTH_LINE
-from icha.figures.select import select_snapshots
+from icha.figures.select import has_shape, select_snapshots
 from icha.figures.style import BLACK, GREY, in_style, logarithmic_axes, new_panels
 
 if TYPE_CHECKING:
@@ -71,13 +71,13 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
         if p.size:
             right.plot([], [], ls=":", lw=1.1, color=GREY, label="singular tension at the edge")
     load = np.mean([float(state_of(run, at)["reduced_pressure"]) for run, at in lines[-1].members])
-    _finish(left, right, (lowest, highest), top, load)
+    _finish(left, right, (lowest, highest), top, 0.0 if has_shape(lines[-1].members[0][0]) else load)
     add_snapshot_legend(fig, [left, right], campaign[study].to_dataset(), lines, looks)
     return fig
 
 
 def _finish(left, right, pressures, highest, load):
-    """Label both panels, draw Persson's theory at the reduced pressure `load`, and set the limits of the axes."""
+    """Label both panels, draw Persson's theory at a reduced pressure `load` > 0, and set the limits of the axes."""
     from icha.references.persson import persson_pressure_density
 
     if load > 0:

@@ -1,4 +1,4 @@
-"""Runs of indenters for figures: series of runs, curves of Hertz and JKR, and states that a fit of JKR uses."""
+"""Runs of indenters for figures: series of runs, and curves of Hertz and JKR."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from icha.contact.models import REFERENCE_MODEL
 from icha.figures import select
 from icha.figures.declaration import Campaign, UnloadedFigure
-from icha.figures.looks import graded_colours
+from icha.figures.looks import distinct_colours, graded_colours
 from icha.figures.style import BLACK
 from icha.support.formatting import format_quantity
 from icha.support.values import Problem
@@ -39,52 +39,70 @@ class Series(NamedTuple):
     Attributes
     ----------
     runs : the runs, their labels and their seeds.
-    name : rms height and other labels of the runs, for a legend.
-    colour : colour of the series: black without roughness, brighter for higher roughness.
+    name : surface, rms height and material, for a legend; a surface or material that tells nothing is left out.
+    contact : surface and material of the name; empty if series differ only in their rms height.
+    colour : colour of the series. If series differ only in their rms height, black without roughness, brighter for
+        higher roughness.
     """
 
     runs: select.ContactRuns
     name: str
+    contact: str
     colour: str
 
+    @property
+    def first_run(self) -> xr.Dataset:
+        """The first run; all runs of a series have the same shape and material."""
+        return next(iter(self.runs.by_seed.values()))
 
-def select_series(campaign: xr.DataTree, study: str) -> list[Series]:
+
+def select_series(campaign: xr.DataTree, study: str, *, only_jkr: bool = False) -> list[Series]:
     """Return the series of a study on free squares that unload, by increasing rms height.
 
     If the study has boundary elements, the series are those of boundary elements.
 
+    Parameters
+    ----------
+    only_jkr : True to leave out runs without adhesion, without a radius, and on layers.
+
     Raises
     ------
     NothingToDraw
-        If no run is complete and unloads, or if no run is on a free square.
+        If no run is complete and unloads, if no run is on a free square, or if all runs are left out.
     """
     # The asperity model is usually not applicable to conformal contact.
     unloaded = select.select_unloaded_runs(campaign, study, REFERENCE_MODEL)
     runs = [(labels, run) for labels, run in unloaded if "force" in run]
     if not runs:
         raise select.NothingToDraw(f"study {study}: no run is on a free square; expected surfaces with a shape")
+    if only_jkr:
+        runs = [(labels, run) for labels, run in runs if (sphere := sphere_of(run)) and sphere[2]]
+        if not runs:
+            expected = "the figure needs a radius and a surface energy"
+            raise select.NothingToDraw(f"study {study}: no sphere with adhesion; {expected}")
     groups = sorted(select.group_by_contact(campaign, runs), key=_roughness)
     several = len({group.labels.material for group in groups}) > 1
+    # The rms height tells surfaces apart if they have the same shape and different heights.
+    alike = {(group.labels.surface, _roughness(group)) for group in groups}
+    shapes = {str(run["shape"].values) if "shape" in run else "" for _, run in runs}
+    named = len(shapes) > 1 or len({height for _, height in alike}) < len(alike)
     heights = list(dict.fromkeys(filter(None, map(_roughness, groups))))
     # The darkest colour looks like black, which is that of smooth shapes.
     palette = dict(zip(heights, graded_colours(len(heights) + 1)[1:], strict=True))
+    distinct = distinct_colours(len(groups))
     found = []
-    for group in groups:
-        height = _roughness(group)
+    for k, group in enumerate(groups):
+        height, labels = _roughness(group), group.labels
         words = f"rms height {format_quantity(height, 'm')}" if height else "smooth"
-        name = f"{words}, {group.labels.material}" if several else words
-        found.append(Series(group, name, palette.get(height, BLACK)))
+        surface, material = [labels.surface] if named else [], [labels.material] if several else []
+        colour = distinct[k] if named or several else palette.get(height, BLACK)
+        found.append(Series(group, ", ".join([*surface, words, *material]), ", ".join(surface + material), colour))
     return found
 
 
 def _roughness(group):
     """Return the mean rms height of a group of runs, m, to three digits; 0 without roughness."""
     return float(f"{np.mean([float(run['rms_height']) for run in group.by_seed.values()]):.3g}")
-
-
-def first_run(series: list[Series]) -> xr.Dataset:
-    """Return the first run of some series."""
-    return next(iter(series[0].runs.by_seed.values()))
 
 
 def sphere_of(run: xr.Dataset) -> tuple[float, float, float] | None:
@@ -109,10 +127,3 @@ def theory_curves(run: xr.Dataset, largest_radius: float) -> dict[str, tuple[np.
         jkr = sphere_contact(np.linspace(smallest, largest_radius, _POINTS), radius, modulus, energy)
         curves = {"JKR": (jkr.indentation, jkr.force)} | curves
     return curves
-
-
-def steps_of(run: xr.Dataset) -> list[dict[str, float]]:
-    """Return force, indentation, contact radius and leg of every step of a run."""
-    names = "force", "indentation", "contact_radius", "leg"
-    rows = zip(*(run[name].values.tolist() for name in names), strict=True)
-    return [dict(zip(names, row, strict=True)) for row in rows]

@@ -300,14 +300,19 @@ def graded_colours(count: int, name: str = "viridis", brightest: float = 0.9) ->
     return [to_hex(colour) for colour in mpl.colormaps[name](np.linspace(0, brightest, count))]
 
 
+def distinct_colours(count: int) -> Sequence[str]:
+    """Return the first colours of `COLOURS`; graded colours if there are too few."""
+    return COLOURS[:count] if count <= MOST_COLOURS else graded_colours(count)
+
+
 def _place_colours(places):
     """Return graded colours; if few surfaces have several slopes each, every surface has a hue.
 
     Few surfaces without different slopes have the first colours.
     """
     surfaces = [surface for surface, _ in places]
-    if len(set(surfaces)) == len(places) <= len(COLOURS):
-        return COLOURS[: len(places)]
+    if len(set(surfaces)) == len(places) <= MOST_COLOURS:
+        return distinct_colours(len(places))
     hues = dict(zip(dict.fromkeys(surfaces), _HUES, strict=False))
     if len(hues) < max(2, len(set(surfaces))) or len(hues) == len(places):
         return graded_colours(len(places))

@@ -134,6 +134,15 @@ def lacks_sphere(study: xr.Dataset) -> bool:
     return radius is None or bool(radius.isnull().any()) or bool(thickness is not None and np.isfinite(thickness).any())
 
 
+def lacks_fit(study: xr.Dataset) -> bool:
+    """Return whether a sphere with adhesion that was pulled off has no fit of JKR to loading or to unloading."""
+    pulled = study.get("pull_off_force_over_jkr")
+    if pulled is None:
+        return False
+    fits = [study.get(f"work_of_adhesion_{branch}") for branch in ("approach", "retraction")]
+    return any(fit is None or bool((pulled.notnull() & fit.isnull()).any()) for fit in fits)
+
+
 def is_applicable(run: xr.Dataset) -> bool:
     """Return False if a run states a reason why the asperity model is not applicable, otherwise True."""
     return not run.attrs.get("applicability")

@@ -147,7 +147,7 @@ def _computed_files(campaign, results, files, sha256_of_run) -> Iterator[Item]:
         grid = campaign.grid(case.surface)
         sweep = _cost_parameters(run_settings(campaign, case), campaign.period(case.surface))
         # The contact of a shape stays small, however sticky its roughness is.
-        spreads = sweep["adhesive"] and campaign.surfaces[case.surface].shape is None
+        spreads = sweep["adhesive"] and campaign.is_flat(case.surface)
         ratio = energy_ratio(campaign, case) if spreads else math.inf
         free = campaign.is_free(case.surface)
         cost = run_cost(case.model, grid, summits(case.surface), energy_ratio=ratio, free=free, **sweep)

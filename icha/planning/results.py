@@ -17,7 +17,7 @@ class CampaignFiles:
     ----------
     surfaces : name and seed of each surface, by path.
     runs : labels of each run, by path.
-    theories : surface of each file of theories, by path.
+    theories : surface of each file of theories, by path; theories are for nominally flat surfaces.
     compared : labels of each boundary-element run in a study with both models, by path.
     model_error : path of the file of model errors; empty if no study has both models.
     answers : path of the file of answers; empty if no study has boundary elements for several seeds.
@@ -79,7 +79,7 @@ def campaign_files(campaign: Campaign, folder: str = "") -> CampaignFiles:
     return CampaignFiles(
         surfaces={path(results.SURFACE, surface=name, seed=seed): (name, seed) for name, seed in surfaces},
         runs=runs,
-        theories={path(results.THEORIES, surface=name): name for name, _ in surfaces},
+        theories={path(results.THEORIES, surface=name): name for name, _ in surfaces if campaign.is_flat(name)},
         dataset=path(results.DATASET),
         table=path(results.TABLE),
         comparison=path(results.COMPARISON),

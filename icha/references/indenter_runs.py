@@ -2,21 +2,32 @@
 
 from __future__ import annotations
 
+import contextlib
+import itertools
 import math
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from icha.asperity.material import Material
+from icha.asperity.tabor import SHORT_RANGE_FROM
 from icha.references.indentation import pull_off_state
 from icha.references.jkr_fits import fit_work_of_adhesion
 from icha.surfaces.surface import Surface
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # A fit uses at most one state in each of this number of equal intervals of the indentation. Paths have many states near
 # jumps, which would otherwise have too much weight.
 INTERVALS = 100
 # Smallest number of states for a fit.
 _LEAST_STATES = 3
+
+
+class NoFit(ValueError):
+    """States have no work of adhesion by JKR; the message gives the reason in a few words."""
 
 
 def step_values(row: Mapping[str, float], area: float) -> dict[str, float]:
@@ -38,7 +49,7 @@ def loop_values(
     """Return the values of a loop that ends without contact, by variable name; without adhesion only the force.
 
     Ratios to theories (`icha.references.indentation.pull_off_state`), and fits of JKR, exist only on a half-space. Fits
-    need a shape with a radius and enough states.
+    need a shape with a radius, and states for which `apparent_work_of_adhesion` finds a fit.
 
     Parameters
     ----------
@@ -60,9 +71,9 @@ def loop_values(
     if radius is None:
         return values
     values["pull_off_force_over_jkr"] = pull_off / (1.5 * math.pi * energy * radius)
-    for branch, states in (("approach", first_approach(rows)), ("retraction", last_retraction(rows))):
-        work = apparent_work_of_adhesion(states, radius, material.contact_modulus)
-        if work is not None:
+    for branch, select_states in BRANCHES.items():
+        with contextlib.suppress(NoFit):
+            work = apparent_work_of_adhesion(select_states(rows), radius, material)
             values[f"work_of_adhesion_{branch}"] = work
     return values
 
@@ -73,8 +84,10 @@ def sphere_radius(surface: Surface) -> float | None:
 
 
 def first_approach(rows: Sequence[Mapping[str, float]]) -> list[Mapping[str, float]]:
-    """Return the steps of the first loading that have contact."""
-    return [row for row in rows if row["leg"] == 0 and row["contact_radius"] > 0]
+    """Return the steps of the first loading that have contact, without those that go back to a target inside a jump."""
+    touching = [row for row in rows if row["leg"] == 0 and row["contact_radius"] > 0]
+    deepest = itertools.accumulate((row["indentation"] for row in touching), max)
+    return [row for row, depth in zip(touching, deepest, strict=True) if row["indentation"] == depth]
 
 
 def last_retraction(rows: Sequence[Mapping[str, float]]) -> list[Mapping[str, float]]:
@@ -84,19 +97,56 @@ def last_retraction(rows: Sequence[Mapping[str, float]]) -> list[Mapping[str, fl
     return [row for row in last[:end] if row["contact_radius"] > 0]
 
 
-def apparent_work_of_adhesion(
-    states: Sequence[Mapping[str, float]], radius: float, contact_modulus: float
-) -> float | None:
+# For each branch of a loop, the function that selects the steps for its fit.
+BRANCHES = {"approach": first_approach, "retraction": last_retraction}
+
+
+def apparent_work_of_adhesion(states: Sequence[Mapping[str, float]], radius: float, material: Material) -> float:
     """Return the work of adhesion of the JKR sphere that fits the contact radii of some states at their forces, J/m^2.
 
-    The modulus is given. Return None if there are too few states at different indentations.
+    Parameters
+    ----------
+    states : values of the states, from `step_values`.
+    radius : radius of the sphere, m.
+    material : material with adhesion; the fit has its contact modulus.
+
+    Raises
+    ------
+    NoFit
+        If the Tabor parameter of the sphere is too small for JKR, if there are too few states at different
+        indentations, or if Hertz's law fits best.
     """
+    if (tabor := float(material.tabor_parameter(radius))) < SHORT_RANGE_FROM:
+        raise NoFit(f"Tabor parameter {tabor:.2g} below {SHORT_RANGE_FROM:g}")
     chosen = spaced_states([row["indentation"] for row in states])
     if len(chosen) < _LEAST_STATES:
-        return None
+        raise NoFit(f"fewer than {_LEAST_STATES} states")
     force, contact_radius = (np.array([states[k][name] for k in chosen]) for name in ("force", "contact_radius"))
-    fit = fit_work_of_adhesion(force, radius, contact_radius=contact_radius, contact_modulus=contact_modulus)
+    fit = fit_work_of_adhesion(force, radius, contact_radius=contact_radius, contact_modulus=material.contact_modulus)
+    if not fit.work_of_adhesion:
+        raise NoFit("Hertz fits better")
     return fit.work_of_adhesion
+
+
+def reason_without_fit(run: xr.Dataset, branch: str) -> str:
+    """Return why a run on a sphere with adhesion has no fit of JKR to a branch of `BRANCHES`; "" with a fit."""
+    if f"work_of_adhesion_{branch}" in run:
+        return ""
+    if "pull_off_force_over_jkr" not in run:
+        return "not pulled off"
+    material = Material(*(float(run[name]) for name in ("contact_modulus", "surface_energy", "interaction_range")))
+    try:
+        apparent_work_of_adhesion(BRANCHES[branch](steps_of(run)), float(run["shape_radius"]), material)
+    except NoFit as reason:
+        return str(reason)
+    return ""
+
+
+def steps_of(run: xr.Dataset) -> list[dict[str, float]]:
+    """Return force, indentation, contact radius and leg of every step of a run."""
+    names = "force", "indentation", "contact_radius", "leg"
+    rows = zip(*(run[name].values.tolist() for name in names), strict=True)
+    return [dict(zip(names, row, strict=True)) for row in rows]
 
 
 def spaced_states(indentation: Sequence[float]) -> np.ndarray:

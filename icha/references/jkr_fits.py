@@ -17,13 +17,16 @@ from icha.support.rules import CONTACT_MODULUS, LENGTH, SURFACE_ENERGY
 # First and last root of the work of adhesion at which fits start, in the unit of the largest force, and their number.
 _STARTS = 0.1, 1.2, 24
 
+# Sums of squares are equal up to this relative difference.
+_ROUNDING = 1e-12
+
 
 class JKRFit(NamedTuple):
     """Result of a fit.
 
     Attributes
     ----------
-    work_of_adhesion : apparent work of adhesion, J/m^2.
+    work_of_adhesion : apparent work of adhesion, J/m^2; 0 if no law with adhesion fits better than Hertz's law.
     contact_modulus : E*, Pa, fitted or given.
     misfit : rms difference between data and fit, divided by the largest absolute value of the data.
     """
@@ -102,7 +105,11 @@ def fit_work_of_adhesion(
     # The sum has several minima: one may be where the tension of a state is the pull-off force of the law.
     starts = [[root, 0.0][:unknowns] for root in np.linspace(*_STARTS)]
     fits = [least_squares(residuals, start, x_scale=1.0, xtol=1e-14, ftol=1e-14, gtol=1e-14) for start in starts]
+    # At the root 0 the derivative of the sum may be positive, and the search only comes near. Hertz's law is at 0.
+    hertzian = least_squares(lambda unknown: residuals([0.0, *unknown[1:]]), [0.0] * unknowns)
+    hertzian.x[0] = 0.0
     found = min(fits, key=lambda fit: fit.cost)
+    found = hertzian if hertzian.cost <= found.cost * (1 + _ROUNDING) else found
     return JKRFit(*parameters(found.x), float(np.sqrt(np.mean(found.fun**2))))
 
 

@@ -13,6 +13,7 @@ from icha.datasets.campaign import loading_stops, reduced_gap, run_place, runs_o
 from icha.datasets.labels import LABELS, RunLabels, slopes_of
 from icha.datasets.variables.campaign import BEYOND_MODEL, COMPUTED_RUNS, FAILED_RUNS, LOADED_RUNS, MISSING, RAGGED
 from icha.figures.select import has_shape, path_steps
+from icha.references.indenter_runs import BRANCHES, reason_without_fit
 from icha.report.template import MOST_ROWS, format_mean, format_range, format_scientific
 from icha.support.formatting import choose_unit, format_quantity
 
@@ -249,9 +250,16 @@ def _pull_off(runs: list[xr.Dataset], has_interval: bool) -> dict:
             **({} if "force" in runs[0] else {"over_summits": mean(values("pull_off_over_summits"))}),
             "detachment": mean(values("detachment_pressure"), "Pa"),
         }
-    units = {"pull_off_force": "N", "pull_off_force_over_theory": "", "work_of_adhesion_approach": "J/m²"}
-    units |= {"work_of_adhesion_retraction": "J/m²"}
+    units = {"pull_off_force": "N", "pull_off_force_over_theory": ""}
+    units |= {f"work_of_adhesion_{branch}": "J/m²" for branch in BRANCHES}
     cells |= {name: mean(values(name), unit) for name, unit in units.items() if all(name in run for run in runs)}
+    if all("pull_off_force_over_jkr" in run for run in runs):
+        reasons = {branch: list(filter(None, (reason_without_fit(run, branch) for run in runs))) for branch in BRANCHES}
+        cells |= {
+            f"work_of_adhesion_{branch}": f"no fit of {len(each)} of {len(runs)}: {', '.join(dict.fromkeys(each))}"
+            for branch, each in reasons.items()
+            if each
+        }
     return cells
 
 

@@ -5,6 +5,9 @@ import math
 import pytest
 
 from icha.configuration.cases import run_cases, run_settings, surface_cases, surface_settings
+from icha.datasets.results import ResultFiles
+from icha.figures import fig2_area_and_gap, fig7_stiffness
+from icha.planning.results import campaign_files
 from icha.surfaces.shapes import Cone, CylinderPunch, FlatPunch, Paraboloid, Sphere, Wave
 
 BALL = {"kind": "smooth", "side": "200 um", "grid": 64, "shape": {"sphere": {"radius": "1 mm"}}}
@@ -23,6 +26,16 @@ def test_a_smooth_surface_has_neither_seeds_nor_slopes(load):
     assert surface_cases(campaign) == [("ball", 0), ("rough", 1), ("rough", 2)]
     assert len(paths(campaign)) == 1 + 2 * 2
     assert campaign.is_free("ball") and campaign.period("ball") == 200e-6
+
+
+def test_theories_of_rough_contact_are_only_for_surfaces_without_a_shape(load):
+    for surfaces, inputs in (["ball", "rough"], {"campaign"}), (["rough", "ball"], {"campaign", "references"}):
+        changes = {"surfaces.ball": BALL, "studies.one.surfaces": surfaces, "studies.one.models": ["boundary_elements"]}
+        campaign = load(changes).campaign
+        assert list(campaign_files(campaign).theories.values()) == ["rough"]
+        for module in (fig2_area_and_gap, fig7_stiffness):
+            options = module.DECLARATION.options(study="one")
+            assert module.DECLARATION.inputs(campaign, options, ResultFiles(campaign.name)).keys() == inputs
 
 
 def test_rough_surfaces_beside_smooth_ones_need_slopes(refused):

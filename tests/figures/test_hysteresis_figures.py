@@ -12,6 +12,7 @@ from icha.contact.models import REFERENCE_MODEL
 from icha.datasets.campaign import campaign_tree
 from icha.datasets.labels import RunLabels
 from icha.figures import fig13_loops, fig14_pull_off, fig15_loss, fig16_snap_map
+from icha.figures.captions import caption_of, texts_of
 from icha.figures.ensembles import Points
 from icha.figures.fig15_loss import PARTS, fit_line, shares
 from icha.figures.select import ContactRuns, select_unloaded_runs
@@ -224,6 +225,28 @@ def test_fig14_shows_boundary_elements_beside_asperities():
     np.testing.assert_array_equal(asperities.get_ydata(), truth.get_ydata())
     assert (truth.get_xdata() > asperities.get_xdata()).all()
     assert {"asperities", "boundary elements"} < set(legend(figure))
+
+
+@pytest.mark.parametrize("module", [fig14_pull_off, fig15_loss])
+def test_captions_name_the_models_that_are_drawn(module):
+    runs = separate.study("one", materials=("sticky",))
+    truths = [(labels._replace(model=REFERENCE_MODEL), run) for labels, run in runs]
+    words = []
+    for drawn in (runs, truths, runs + truths):
+        tree = separate.tree(drawn)
+        shown = texts_of(draw(module, tree, "one"), {"campaign": tree}, ["one"])
+        words.append(caption_of(module.__name__.rsplit(".", 1)[1], shown))
+    alone, truth, both = words
+    assert "All symbols are the asperity model" in alone and "All symbols are boundary elements" in truth
+    assert "Crosses" in both and "other symbols" in both and "All symbols" not in both
+    assert not [text for text in (alone, truth) if "Crosses" in text or "causes are those of the asperity" in text]
+
+
+def test_fig14_shows_the_slope_zero_of_a_smooth_shape():
+    runs = separate.study("one", slopes=(1.0, 0.1), materials=("sticky",), seeds=(1,))
+    runs = [(labels._replace(rms_slope=labels.rms_slope - 0.1), run) for labels, run in runs]
+    (axes,) = fig14_pull_off.figure(separate.tree(runs), study="one").axes
+    assert axes.get_xscale() == "linear" and axes.get_xlim()[0] < 0
 
 
 def test_fig14_shows_zero_and_values_that_span_decades():

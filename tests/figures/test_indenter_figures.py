@@ -4,12 +4,18 @@ import math
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import icha
 from icha.analysis.validity import statements_on_dataset
+from icha.asperity.tabor import SHORT_RANGE_FROM
+from icha.cli import app
 from icha.datasets.campaign import campaign_tree
+from icha.datasets.files import write_dataset
 from icha.datasets.labels import RunLabels
 from icha.figures import (
+    fig2_area_and_gap,
+    fig3_distributions,
     fig5_multi_slope,
     fig7_stiffness,
     fig17_force_indentation,
@@ -20,6 +26,7 @@ from icha.figures import (
 )
 from icha.figures.captions import caption_of, texts_of
 from icha.figures.indenter_curves import select_series
+from icha.report.studies import summarise_study
 from icha.surfaces.shapes import Cone, CylinderPunch, Sphere
 
 SIDE, GRID, MODULUS, RADIUS = 48e-6, 48, 1e6, 1e-3
@@ -85,6 +92,86 @@ def test_the_line_of_jkr_leaves_out_shapes_without_a_radius(order):
         for drawn, tree in ((fig, several), (only, alone))
     ]
     assert ["without a radius" in caption for caption in captions] == [True, False]
+
+
+@pytest.fixture(scope="module")
+def lenses():
+    """Return the dataset of two smooth lenses of different radii, and of the smaller one without adhesion."""
+    runs = {"small": press(), "large": press(shape=Sphere(2 * RADIUS)), "dry": press(energy=0.0)}
+    places = {"small": ("small", "soft"), "large": ("large", "soft"), "dry": ("small", "dry")}
+    labels = {name: RunLabels("press", "boundary_elements", at, 0, 0.0, of) for name, (at, of) in places.items()}
+    return campaign_tree((labels[name], run) for name, run in runs.items())
+
+
+def caption(module, figure, tree):
+    return caption_of(module.__name__.rsplit(".", 1)[1], texts_of(figure, {"campaign": tree}, ["press"]))
+
+
+def test_each_panel_has_the_theories_of_its_own_runs(lenses):
+    figure = fig17_force_indentation.figure(lenses, study="press")
+    panels = {ax.get_title("right"): ax for ax in figure.axes}
+    assert panels.keys() == {"small, smooth, soft", "small, smooth, dry", "large, smooth, soft"}
+    factor = {"µ": 1e6, "n": 1e9}[figure.axes[0].get_ylabel()[7]]
+    for title, ax in panels.items():
+        lowest, radius = min(line[:, 1].min() for line in lines(ax)), RADIUS * (1 + title.startswith("large"))
+        # Without adhesion, no line is below zero.
+        bare = "dry" in title
+        assert lowest / factor == pytest.approx(0.0 if bare else -1.5 * math.pi * ENERGY * radius, rel=0.03, abs=1e-12)
+        hertz = lines(ax)[0 if bare else 1]
+        force = 4 / 3 * MODULUS * np.sqrt(radius) * (hertz[:, 0] * 1e-9) ** 1.5
+        np.testing.assert_allclose(hertz[:, 1] / factor, force)
+    words = caption(fig17_force_indentation, figure, lenses)
+    assert "Runs without adhesion have no line of JKR" in words and "Colours become brighter" not in words
+
+
+def test_lenses_have_names_and_colours_of_their_own_and_bare_ones_are_left_out(lenses):
+    figure = fig18_jkr_plot.figure(lenses, study="press")
+    (legend,) = figure.legends
+    entries = [(text.get_text(), line) for text, line in zip(legend.get_texts(), legend.legend_handles, strict=True)]
+    names = {text.partition(":")[0]: line.get_color() for text, line in entries if "loading" in text}
+    assert names.keys() == {"small, smooth", "large, smooth"} and len(set(names.values())) == 2
+    assert "Runs without adhesion are left out" in caption(fig18_jkr_plot, figure, lenses)
+
+
+def test_points_of_different_lenses_are_not_joined(lenses, campaign):
+    figure = fig19_work_of_adhesion.figure(lenses, study="press")
+    assert all(len(line) == 1 for line in lines(figure.axes[0])[:-1])
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert {"small", "large"} < set(names) and not [name for name in names if "dry" in name]
+    # A smooth and a rough sphere of the same radius are joined.
+    joined = fig19_work_of_adhesion.figure(campaign, study="press").axes[0]
+    assert [len(line) for line in lines(joined)[:-1]].count(2) == 3
+
+
+def test_states_beyond_jkr_do_not_spoil_the_axes_and_spheres_of_long_range_have_no_fit(tmp_path):
+    """A little contact area under the attraction across the gap has F/a^(3/2) far below that of JKR."""
+    run = press().drop_vars(["work_of_adhesion_approach", "work_of_adhesion_retraction"])
+    run["interaction_range"] = run["interaction_range"] * 0 + (RADIUS * (ENERGY / MODULUS) ** 2) ** (1 / 3) / 0.3
+    first = int(np.argmax(run["contact_radius"].values > 0))
+    run["contact_radius"][first] = 1e-3 * run["contact_radius"].max()
+    tree = tree_of(run)
+    (row,) = summarise_study(tree, "press")["loops"]["rows"]
+    assert row["work_of_adhesion_approach"] == "no fit of 1 of 1: Tabor parameter 0.3 below 3"
+    write_dataset(run, tmp_path / "run.nc")
+    shown = CliRunner().invoke(app, ["show", str(tmp_path / "run.nc")]).output
+    assert "approach no fit (Tabor parameter 0.3 below 3)" in shown
+    figure = fig18_jkr_plot.figure(tree, study="press")
+    lowest = min(line[:, 0].min() for ax in figure.axes for line in lines(ax))
+    factor = {"k": 1e-3, "N": 1.0}[figure.axes[0].get_xlabel().split("(")[1][0]]
+    assert -math.sqrt(8 * math.pi * MODULUS * ENERGY) < lowest / factor < 0
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    reason = "no fit (Tabor parameter 0.3 below 3)"
+    assert f"smooth: loading {reason}, unloading {reason}" in names
+    words = caption(fig18_jkr_plot, figure, tree)
+    assert f"Tabor parameter of the sphere is below {SHORT_RANGE_FROM:g}" in words
+    assert f"A smooth sphere with a Tabor parameter of {SHORT_RANGE_FROM:g} or more gives a straight line" in words
+
+
+@pytest.mark.parametrize("module", [fig2_area_and_gap, fig3_distributions, fig7_stiffness])
+def test_captions_say_that_theories_of_flat_surfaces_do_not_hold_under_a_shape(module):
+    tree = tree_of(press(rms=1e-8, energy=0.0))
+    words = caption(module, module.figure(tree, study="press"), tree)
+    assert "They do not hold under a shape, so none is drawn" in words and "Persson" not in words
 
 
 def test_works_of_adhesion_of_a_smooth_sphere_are_one(campaign):

@@ -4,13 +4,20 @@ import math
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import icha
 from icha.boundary_elements.observables import hull_area
 from icha.equilibrium.distributions import edge_share
 from icha.figures.indenter_curves import sphere_of
 from icha.references import indentation as closed
-from icha.references.indenter_runs import loop_values, spaced_states
+from icha.references.indenter_runs import (
+    apparent_work_of_adhesion,
+    first_approach,
+    loop_values,
+    reason_without_fit,
+    spaced_states,
+)
 from icha.simulation import asperity_applicability
 from icha.surfaces.shapes import Cone, Paraboloid, Sphere, describe_shape
 
@@ -53,6 +60,54 @@ def test_values_that_are_not_defined_are_left_out():
     assert values["pull_off_force_over_theory"] == pytest.approx(SIDE**2 / known)
     layer = icha.Material(MODULUS, ENERGY, 1e-9, thickness=1e-5)
     assert loop_values(rows, loop, SMOOTH, layer).keys() == {"pull_off_force", "loss_over_contact"}
+
+
+def loop_of_sphere(states, interaction_range=1e-9):
+    """Return the values of a loop that passes some states in loading and backwards in unloading."""
+    rows = rows_of(states, 0)
+    rows += [row | {"leg": 1} for row in reversed(rows)] + [dict(force=0.0, indentation=9.0, contact_radius=0.0, leg=1)]
+    loop = {"pull_off_pressure": 1.0, "hysteresis_loss": 0.0, "largest_contact_area_fraction": 0.1}
+    return loop_values(rows, loop, SMOOTH, icha.Material(MODULUS, ENERGY, interaction_range))
+
+
+def test_jkr_is_fitted_to_spheres_with_a_tabor_parameter_of_three_or_more():
+    unit = float(closed.sphere_pull_off(RADIUS, MODULUS, ENERGY).contact_radius)
+    states = closed.sphere_contact(unit * np.linspace(1.1, 4, 40), RADIUS, MODULUS, ENERGY)
+    reach = (RADIUS * (ENERGY / MODULUS) ** 2) ** (1 / 3)
+    names = {"work_of_adhesion_approach", "work_of_adhesion_retraction"}
+    assert names <= loop_of_sphere(states, interaction_range=reach / 3.01).keys()
+    below = loop_of_sphere(states, interaction_range=reach / 2.9)
+    assert not names & below.keys() and "pull_off_force_over_jkr" in below
+
+
+def test_a_contact_smaller_than_by_hertz_has_no_fit():
+    states = closed.sphere_contact(np.linspace(2e-6, 9e-6, 40), RADIUS, MODULUS)
+    values = loop_of_sphere(states._replace(force=states.force + 0.3 * states.force.max()))
+    assert "pull_off_force_over_jkr" in values and not [name for name in values if name.startswith("work_of_adhesion")]
+
+
+def test_states_that_go_back_to_a_target_inside_a_jump_are_not_loading():
+    """The branch beyond the pull-off force, which the path visits on the way to small contact radii, is not fitted."""
+    unit = float(closed.sphere_pull_off(RADIUS, MODULUS, ENERGY).contact_radius)
+    back, on = (
+        rows_of(closed.sphere_contact(unit * np.linspace(*ends), RADIUS, MODULUS, ENERGY), 0)
+        for ends in ((1.5, 0.7, 9), (0.8, 3.0, 30))
+    )
+    states = first_approach(back + on)
+    assert states[0] == back[0] and all(row["contact_radius"] >= back[0]["contact_radius"] for row in states)
+    material = icha.Material(MODULUS, ENERGY, 1e-9)
+    assert apparent_work_of_adhesion(states, RADIUS, material) == pytest.approx(ENERGY, rel=1e-6)
+
+
+@pytest.mark.parametrize(("reach", "count", "reason"), [(2.0, 9, "Tabor parameter 2 below 3"), (9, 2, "fewer than 3")])
+def test_a_run_states_why_it_has_no_fit(reach, count, reason):
+    states = closed.sphere_contact(np.linspace(9e-6, 1.2e-5, count), RADIUS, MODULUS, ENERGY)
+    columns = {name: ("step", values) for name, values in states._asdict().items()} | {"leg": ("step", [0] * count)}
+    tabor = {"interaction_range": (RADIUS * (ENERGY / MODULUS) ** 2) ** (1 / 3) / reach}
+    known = {"shape_radius": RADIUS, "contact_modulus": MODULUS, "surface_energy": ENERGY} | tabor
+    run = xr.Dataset(columns | known | {"pull_off_force_over_jkr": 1.0})
+    assert reason in reason_without_fit(run, "approach")
+    assert not reason_without_fit(run.assign(work_of_adhesion_approach=ENERGY), "approach")
 
 
 def test_states_for_a_fit_are_spread_over_the_indentation():

@@ -36,6 +36,16 @@ def test_fit_to_hertz_finds_no_adhesion(quantity):
     assert fit.contact_modulus == pytest.approx(MODULUS, rel=1e-4)
 
 
+@pytest.mark.parametrize("modulus", [MODULUS, None])
+def test_contact_smaller_than_by_hertz_has_no_work_of_adhesion(modulus):
+    """Forces are larger than by Hertz's law, as on the first patches of a rough sphere."""
+    states = stable_states(0.0)
+    force = states.force + 0.3 * states.force.max()
+    fit = fit_work_of_adhesion(force, RADIUS, contact_radius=states.contact_radius, contact_modulus=modulus)
+    assert fit.work_of_adhesion == 0.0
+    assert fit.contact_modulus == MODULUS if modulus else fit.contact_modulus > 0
+
+
 def test_fit_is_a_minimum_of_the_squared_differences_of_cubed_radii():
     rng, states = np.random.default_rng(2), stable_states(0.05, smallest=1.5)
     a = np.asarray(states.contact_radius) * (1 + 0.02 * rng.standard_normal(30))
