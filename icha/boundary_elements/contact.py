@@ -16,7 +16,7 @@ from icha.asperity.material import Material
 from icha.boundary_elements import minimise as solver
 from icha.boundary_elements.elastic import HalfSpace
 from icha.boundary_elements.full_contact import ROUNDING, FullContactProblem
-from icha.boundary_elements.laws import Cohesive, NoAttraction, ShortRange, average
+from icha.boundary_elements.laws import Cohesive, NoAttraction, ShortRange, at_cells, average
 from icha.boundary_elements.observables import PatchObservables
 from icha.boundary_elements.patches import (
     BEYOND_EDGES,
@@ -262,7 +262,9 @@ class BoundaryElements(FullContactProblem):
             areas = ShortRange.adhesive_areas(state.fraction, state.mean_fraction)
         else:
             areas = state.fraction**2
-        return float(np.sum(areas)) / self.count
+        mean = np.mean(self.attraction.adhesion_length)
+        work = at_cells(self.attraction.adhesion_length, state.cells) / mean if mean else 1.0
+        return float(np.sum(work * areas)) / self.count
 
     def gap(self, state: CellState) -> np.ndarray:
         """Return the gap at the grid nodes, (n, n), m; in partial cells it is the extension of the bond."""
@@ -416,9 +418,8 @@ class BoundaryElements(FullContactProblem):
         elastic = 0.5 * state.pressure * (self.heights.ravel()[state.cells] - state.separation)
         if not self.adhesive:
             return elastic
-        return elastic - self.law.material.surface_energy * self.attraction.adhesive_areas(
-            state.fraction, state.mean_fraction
-        )
+        work = at_cells(self.attraction.adhesion_length, state.cells) * self.contact_modulus * self.spacing
+        return elastic - work * self.attraction.adhesive_areas(state.fraction, state.mean_fraction)
 
 
 def contact_of(surface: Surface, material: Material) -> BoundaryElements:

@@ -61,6 +61,11 @@ def _modes_of_stencil(grid):
     return modes[:, None] * modes[: grid // 2 + 1]
 
 
+def at_cells(values: np.ndarray | float, cells: np.ndarray) -> np.ndarray | float:
+    """Return the values of some cells, (k,), from a field, (n, n), or a number that holds for all cells."""
+    return values if np.ndim(values) == 0 else np.ravel(values)[cells]
+
+
 def with_neighbours(cells: np.ndarray) -> np.ndarray:
     """Return a periodic mask, (n, n), together with all cells that share an edge with one of its cells."""
     result = cells.copy()
@@ -248,11 +253,8 @@ class ShortRange:
         """Return the law of every cell, with the work at the present fractions; only neighbours of contact attract."""
         cells = np.flatnonzero(with_neighbours(fraction > 0))
         mean = average(fraction).ravel()[cells]
-        work = self._adhesion_length_of(cells) * (1 - PERIMETER + 2 * PERIMETER * mean)
+        work = at_cells(self.adhesion_length, cells) * (1 - PERIMETER + 2 * PERIMETER * mean)
         return Bonds(cells, work, np.sqrt(2 * BOND_COMPLIANCE * work))
-
-    def _adhesion_length_of(self, cells):
-        return self.adhesion_length if np.ndim(self.adhesion_length) == 0 else np.ravel(self.adhesion_length)[cells]
 
     @property
     def straight_strength(self) -> float:
@@ -326,7 +328,7 @@ class ShortRange:
         """Return the tangent of the law at given fractions, (k,)."""
         partial = (fraction > 0) & (fraction < 1)
         cells, peak, reach = (np.asarray(each)[partial] for each in (bonds.cells, bonds.peak, bonds.reach))
-        coupling = 2 * PERIMETER * self._adhesion_length_of(cells) / (BOND_COMPLIANCE * peak)
+        coupling = 2 * PERIMETER * at_cells(self.adhesion_length, cells) / (BOND_COMPLIANCE * peak)
         return Tangent(cells, fraction[partial], peak, reach, coupling, neighbour_weights(cells, grid))
 
 
