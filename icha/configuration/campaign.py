@@ -20,7 +20,7 @@ from icha.configuration.studies import RmsHeight, Study, is_unread, slope_of_hei
 from icha.configuration.surfaces import AnySurface, MaterialSection
 from icha.contact.models import MODELS
 from icha.datasets.labels import is_derived_study
-from icha.path.targets import CONTACT_RADIUS, FORCE, INDENTATION, WITHOUT_ADHESION, Target
+from icha.path.targets import AREAS, CONTACT_RADIUS, FORCE, INDENTATION, WITHOUT_ADHESION, Target
 from icha.support import formatting
 from icha.support.tables import read_columns
 from icha.support.values import Name, Problem, Section, Text, distinct
@@ -325,6 +325,24 @@ class Campaign(Section):
                     reason += f", but the square has the side {given}; expected a side of at least {least}"
                     yield location or ("surfaces",), values[location], f"{reason}, or smaller targets"
                     break
+            yield from self._jump_in_problems(study, name, label)
+
+    def _jump_in_problems(self, study: Study, surface: str, material: str) -> Iterator[Problem]:
+        """Yield a problem for a target contact smaller than that of pull-off: a smooth sphere jumps over it."""
+        from icha.references.indentation import pull_off_state
+
+        section, adhesive = self.surfaces[surface], self.materials[material]
+        shape = section.shape.shape
+        if not (section.smooth and shape.sphere_radius and adhesive.surface_energy and adhesive.thickness is None):
+            return
+        radius = float(pull_off_state(shape, adhesive.contact_modulus, adhesive.surface_energy).contact_radius)
+        smallest = formatting.length(radius, 3)
+        radii = self.contact_radii(study, surface, material)
+        for location, kind, value in study.states():
+            if location[0] == "targets" and kind in AREAS and radii[location] < radius:
+                reason = f"lies inside the jump into contact of {material!r} on {surface!r}, which pulls off from a"
+                yield location, value, f"{reason} contact radius of {smallest}; expected larger contacts, or `indentations`"
+                return
 
     def resolve_paths(self, folder: FilePath) -> Campaign:
         """Return the campaign with `folder` added in front of all paths of files."""

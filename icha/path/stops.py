@@ -147,7 +147,7 @@ class InsideJump(NotConverged):
         super().__init__(
             f"{target.target.describe()} lies inside a jump: at {describe_separation(contact, after)} the contact area "
             f"jumps from {area_before:.3g} to {area_after:.3g} of the nominal area, and the branch after the jump does "
-            f"not reach back to the target; {remedy}"
+            f"not reach back to the target before pull-off; {remedy}"
         )
         self.target, self.before = target, before
 
@@ -203,11 +203,19 @@ def _is_reachable(target, before, after):
 
 
 def _solve_after_jump(target, before, after):
-    """Find the state at a target on the branch after a jump; raise `InsideJump` if the branch does not meet it."""
+    """Find the state at a target on the branch after a jump; raise `InsideJump` if the branch does not meet it.
+
+    On loading, the branch ends where its tension is largest: beyond, the surfaces would be pulled off.
+    """
+    contact = target.contact
     try:
-        return target.solve(after, after.separation)
+        found = target.solve(after, after.separation)
     except NotConverged:
         raise InsideJump(target, before, after) from None
+    pulled = before.separation > after.separation < found.separation
+    if pulled and contact.pressure(found) < 0 and contact.stiffness(found) < 0:
+        raise InsideJump(target, before, after)
+    return found
 
 
 def _guess_separation(target, before, after):

@@ -162,3 +162,19 @@ def test_an_unusual_youngs_modulus_is_refused(refused):
     bodies = [{"youngs_modulus": "2 mPa", "poisson_ratio": 0.5}, "rigid"]
     changes = {"materials.soft.contact_modulus": None, "materials.soft.bodies": bodies}
     refused("", changes, "materials.soft.bodies[0].youngs_modulus: '2 mPa' is unusual; expected 1 kPa to 2000 GPa")
+
+
+def test_a_contact_smaller_than_that_of_pull_off_is_refused(refused, load):
+    """A smooth sphere jumps from no contact to a larger one: it pulls off from 110 um."""
+    ball = {**BALL, "side": "500 um", "shape": {"sphere": {"radius": "5 mm"}}}
+    sticky = {"contact_modulus": "2.667 MPa", "surface_energy": "40 mJ/m^2", "interaction_range": "1 nm"}
+    changes = {
+        "surfaces.ball": ball,
+        "materials.sticky": sticky,
+        "studies.one.surfaces": ["ball"],
+        "studies.one.materials": ["sticky"],
+        "studies.one.rms_slopes": None,
+    }
+    small = changes | {"studies.one.targets": {"contact_radii": ["60 um", "140 um"]}}
+    refused("", small, "of 'sticky' on 'ball', which pulls off from a contact radius of 110 um")
+    load(changes | {"studies.one.targets": {"contact_radii": ["120 um", "140 um"]}})

@@ -94,3 +94,17 @@ def test_without_adhesion_no_contact_has_a_load_of_zero_or_less():
     turns = icha.Path(forces=[1e-4], turning_points=[("force", -1e-5)])
     with pytest.raises(ValueError, match="path: force = -10 µN is not a load"):
         icha.simulate(sphere(), bare, turns)
+
+
+@MODELS
+def test_loading_reaches_a_contact_inside_the_jump_only_before_pull_off(model):
+    """Beyond the largest tension of the branch after the jump, the surfaces would be pulled off."""
+    smallest = float(indentation.sphere_pull_off(RADIUS, MODULUS, ENERGY).contact_radius)
+    for radius, reached in ((0.9 * smallest, False), (1.08 * smallest, True)):
+        path = icha.Path(contact_radii=[radius], unload=True)
+        if reached:
+            run = icha.simulate(sphere(), MATERIAL, path, model=model)
+            assert float(run["pull_off_force"]) == pytest.approx(PULL_OFF, rel=1e-2)
+        else:
+            with pytest.raises(icha.ConvergenceError, match="does not reach back to the target before pull-off"):
+                icha.simulate(sphere(), MATERIAL, path, model=model)
