@@ -10,6 +10,7 @@ from icha.contact.model import NotConverged
 from icha.contact.models import RESIDUAL_TOLERANCE
 from icha.equilibrium.interacting_asperities import InteractingAsperities, contact_of
 from icha.path.follow import follow
+from icha.references.indentation import sphere_pull_off
 from icha.surfaces.summits import find_summits
 
 PERIOD, MODULUS = 100e-6, 25e6
@@ -101,22 +102,24 @@ def test_steps_of_half_the_length_and_more_targets_change_the_area_by_less_than_
         np.testing.assert_allclose(many[name][[1, -1]], few[name], rtol=0.01)
 
 
-def test_a_target_inside_a_jump_is_met_on_the_branch_after_it_as_far_as_that_reaches_back(surface):
-    """The first contact with adhesion jumps to a finite area, which shrinks to jump-off as the surfaces part again."""
+def test_a_target_inside_a_jump_is_met_on_the_branch_after_it_before_pull_off(surface):
+    """The first contact with adhesion jumps to a finite area, and pulls off from a smaller one as the surfaces part."""
     contact = contact_of(surface, ADHESIVE)
     first = contact.equilibrium(contact.untouched(), contact.untouched().separation * (1 - 1e-9))
     jumped = contact.area_fraction(first)
     assert contact.pressure(first) < 0
     R, a = first.spots.radius_of_curvature[0], first.spots.contact_radius[0]
-    smallest = (contact.law.jump_off_radius(R) / a) ** 2
-    assert 0.1 < smallest < 0.5
-    for part in (0.9, 0.5):
-        run = simulate(surface, ADHESIVE, Path(area_fractions=[part * jumped]))
-        assert float(run.contact_area_fraction[0]) == pytest.approx(part * jumped, rel=1e-9)
-        assert int(run.spot_count[0]) == 1 and float(run.mean_separation[0]) > contact.untouched().separation
-    with pytest.raises(ConvergenceError, match="lies inside a jump") as caught:
-        simulate(surface, ADHESIVE, Path(area_fractions=[0.1 * jumped]))
-    assert caught.value.dataset.sizes["step"] == 0
+    pull_off = sphere_pull_off(R, ADHESIVE.contact_modulus, ADHESIVE.surface_energy)
+    smallest = (float(pull_off.contact_radius) / a) ** 2
+    assert 0.5 < smallest < 1
+    part = 0.5 * (1 + smallest)
+    run = simulate(surface, ADHESIVE, Path(area_fractions=[part * jumped]))
+    assert float(run.contact_area_fraction[0]) == pytest.approx(part * jumped, rel=1e-9)
+    assert int(run.spot_count[0]) == 1 and float(run.mean_separation[0]) > contact.untouched().separation
+    for part in (0.98 * smallest, 0.1):
+        with pytest.raises(ConvergenceError, match="lies inside a jump") as caught:
+            simulate(surface, ADHESIVE, Path(area_fractions=[part * jumped]))
+        assert caught.value.dataset.sizes["step"] == 0
 
 
 def model_of(surface, model):
