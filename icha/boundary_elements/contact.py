@@ -16,7 +16,7 @@ from icha.asperity.material import Material
 from icha.boundary_elements import minimise as solver
 from icha.boundary_elements.elastic import HalfSpace
 from icha.boundary_elements.full_contact import ROUNDING, FullContactProblem
-from icha.boundary_elements.laws import Cohesive, NoAttraction, ShortRange, at_cells, average
+from icha.boundary_elements.laws import AtDistance, Cohesive, NoAttraction, ShortRange, average
 from icha.boundary_elements.observables import PatchObservables
 from icha.boundary_elements.patches import (
     BEYOND_EDGES,
@@ -256,15 +256,10 @@ class BoundaryElements(FullContactProblem):
     def energetic_area_fraction(self, state: CellState) -> float:
         """Return the energy of adhesion of a state divided by that of full contact.
 
-        At a finite range, this is the sum of f^2 over all cells. At a short range, it is the adhesive area.
+        At a short range, it is the adhesive area; without adhesion, the contact area.
         """
-        if self.divides_cells:
-            areas = ShortRange.adhesive_areas(state.fraction, state.mean_fraction)
-        else:
-            areas = state.fraction**2
-        mean = np.mean(self.attraction.adhesion_length)
-        work = at_cells(self.attraction.adhesion_length, state.cells) / mean if mean else 1.0
-        return float(np.sum(work * areas)) / self.count
+        areas = self.attraction.energetic_areas(state.cells, state.fraction, state.mean_fraction)
+        return float(np.sum(areas)) / self.count
 
     def gap(self, state: CellState) -> np.ndarray:
         """Return the gap at the grid nodes, (n, n), m; in partial cells it is the extension of the bond."""
@@ -418,8 +413,8 @@ class BoundaryElements(FullContactProblem):
         elastic = 0.5 * state.pressure * (self.heights.ravel()[state.cells] - state.separation)
         if not self.adhesive:
             return elastic
-        work = at_cells(self.attraction.adhesion_length, state.cells) * self.contact_modulus * self.spacing
-        return elastic - work * self.attraction.adhesive_areas(state.fraction, state.mean_fraction)
+        energies = self.attraction.energies(state.cells, state.fraction, state.mean_fraction)
+        return elastic + energies * self.contact_modulus * self.spacing
 
 
 def contact_of(surface: Surface, material: Material) -> BoundaryElements:
@@ -441,7 +436,7 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
     column, row = (np.rint(asperities.position / h).astype(int) % surface.grid).T
     cell = row * len(heights) + column
     largest = float(np.abs(heights, where=np.isfinite(heights), out=np.zeros_like(heights)).max())
-    attraction: NoAttraction | ShortRange | Cohesive = NoAttraction()
+    attraction: AtDistance | ShortRange = NoAttraction()
     if material.surface_energy:
         adhesion_length, strength = material.adhesion_length / h, material.interface_strength / material.contact_modulus
         if attraction_on(material, h) == FINITE_RANGE:

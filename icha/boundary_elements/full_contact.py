@@ -9,7 +9,7 @@ import numpy as np
 
 from icha.asperity.jkr import JKR, MaterialUnits
 from icha.boundary_elements.elastic import HalfSpace
-from icha.boundary_elements.laws import Cohesive, NoAttraction, ShortRange
+from icha.boundary_elements.laws import AtDistance, ShortRange
 from icha.boundary_elements.patches import CellState
 from icha.half_space.layer import softness_of
 from icha.surfaces.shapes import Shape
@@ -49,7 +49,7 @@ class FullContactProblem(MaterialUnits):
     rms_slope: float
     asperities: Asperities
     space: HalfSpace
-    attraction: NoAttraction | ShortRange | Cohesive
+    attraction: AtDistance | ShortRange
     summit_cells: np.ndarray
     shape: Shape | None = None
 

@@ -1,8 +1,9 @@
 """Laws of attraction between a cell of the surface and the elastic body: tension and energy as functions of the gap.
 
-All laws soften linearly: the tension falls from its peak s at zero gap to zero at the range r, and does the work W.
+A law gives the tension t of a cell at its gap g, and the energy, whose slope is t. The *fraction* of a cell in contact
+is f = t/s, with the peak s at zero gap. The laws of ICHA soften linearly to the range r and do the work W:
 
-    t(g) = s (1 - g/r),   W = s r / 2,   energy -W f^2,   f = 1 - g/r: the *fraction* of a cell in contact
+    t = s (1 - g/r),   W = s r/2,   energy -W f^2,   f = 1 - g/r
 
 `Cohesive` is the law of an interface whose range the grid resolves. `ShortRange` replaces it where the grid does not
 resolve the range. There the peak follows from the cell size, so that the law is the same for all shorter ranges:
@@ -13,7 +14,8 @@ reach. The sum of the fractions overestimates the contact radius by a constant p
     A = sum f - b sum f (1 - w*f),   b = PERIMETER, w a Gaussian stencil,
 
 subtracts a term in proportion to the perimeter. This term lowers the work W of a cell at convex fronts:
-W = dgamma (1 - b + 2 b w*f). So works and fractions depend on each other, and follow each other in a few rounds.
+W = dgamma (1 - b + 2 b w*f). So works and fractions depend on each other, and follow each other in a few rounds. Where
+dgamma is a field, W = (1 - b) dgamma + b (dgamma w*f + w*(dgamma f)).
 
 Lengths are in units of the cell size, pressures in E*.
 """
@@ -40,6 +42,8 @@ PERIMETER = 0.7
 _EDGE, _FRONT_WIDTH, _SMALLEST_SHARE = 0.236, 1.115, 0.02
 # Largest part of the grid that discs of new contact close at once.
 _MOST_CLOSED = 0.5
+# Smallest change of a gap, over the range, of which the energy is computed exactly.
+_SMALL_CHANGE = 1e-4
 # Rounds in which fractions of neighbours follow each other: for rates, and for each step. Each leaves about a tenth of
 # the error.
 _ROUNDS, _ROUNDS_OF_STEP = 5, 2
@@ -61,7 +65,7 @@ def _modes_of_stencil(grid):
     return modes[:, None] * modes[: grid // 2 + 1]
 
 
-def at_cells(values: np.ndarray | float, cells: np.ndarray) -> np.ndarray | float:
+def at_cells(values: np.ndarray | float, cells: np.ndarray | slice) -> np.ndarray | float:
     """Return the values of some cells, (k,), from a field, (n, n), or a number that holds for all cells."""
     return values if np.ndim(values) == 0 else np.ravel(values)[cells]
 
@@ -77,13 +81,71 @@ def with_neighbours(cells: np.ndarray) -> np.ndarray:
     return result
 
 
-@dataclass(frozen=True, eq=False)
 class Bonds:
-    """Cells that attract the body, with linear softening at constant works and ranges.
+    """Cells that attract the body, at given works of adhesion: tension and energy of a cell as functions of its gap.
+
+    A law defines `tension`, `energy`, `softening` and `gap`, each of the values of its k cells.
+
+    Attributes
+    ----------
+    cells : (k,) int, flat indices of the cells, ascending; or the slice of all cells.
+    peak : (k,) or a number, tension at zero gap, in E*.
+    reach : (k,) or a number, gap at which the tension is zero or negligible, in cell sizes.
+    """
+
+    cells: np.ndarray | slice
+    peak: np.ndarray | float
+    reach: np.ndarray | float
+
+    def tension(self, gap: np.ndarray) -> np.ndarray:
+        """Return the tension of each cell, in E*."""
+        raise NotImplementedError
+
+    def energy(self, gap: np.ndarray) -> np.ndarray:
+        """Return the energy of each cell, in E* times cell size^3: its slope with the gap is the tension."""
+        raise NotImplementedError
+
+    def softening(self, gap: np.ndarray) -> np.ndarray:
+        """Return the fall of the tension with the gap, -dt/dg, of each open cell, in E* per cell size."""
+        raise NotImplementedError
+
+    def gap(self, fraction: np.ndarray) -> np.ndarray:
+        """Return the gap of each cell from its fraction, in cell sizes."""
+        raise NotImplementedError
+
+    def fraction(self, gap: np.ndarray) -> np.ndarray:
+        """Return the fraction f of each cell: its tension divided by the peak."""
+        return self.tension(gap) / self.peak
+
+    def at(self, field: np.ndarray) -> np.ndarray:
+        """Return the values of the cells, (k,), from a field, (n, n)."""
+        return field.ravel()[self.cells]
+
+    def field(self, values: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+        """Return the field, (n, n), from the values of the cells, (k,); it is zero elsewhere."""
+        field = np.zeros(shape)
+        field.ravel()[self.cells] = values
+        return field
+
+    def energy_beyond_mean_tension(self, before: np.ndarray, after: np.ndarray, change: np.ndarray) -> float:
+        """Return the change of the energy minus the mean tension times the change of the gap, in E* times cell size^3.
+
+        For small changes it is zero: the rounding of a difference of energies would be larger.
+
+        before, after, change : (k,), gaps of the cells, and their change, which is finite also outside a shape.
+        """
+        mean = 0.5 * (self.tension(before) + self.tension(after))
+        surplus = self.energy(after) - self.energy(before) - mean * change
+        return float(np.sum(surplus * (np.abs(change) > _SMALL_CHANGE * self.reach)))
+
+
+@dataclass(frozen=True, eq=False)
+class LinearBonds(Bonds):
+    """Bonds with linear softening.
 
     Parameters
     ----------
-    cells : (k,) int, flat indices of the cells, ascending; or the slice of all cells.
+    cells : as in `Bonds`.
     work : (k,) or a number, work of adhesion W of each cell, in E* times cell size.
     reach : (k,) or a number, range r of each cell, in cell sizes.
     """
@@ -98,70 +160,57 @@ class Bonds:
         return 2 * self.work / self.reach
 
     def fraction(self, gap: np.ndarray) -> np.ndarray:
-        """Return the fraction f of each cell, (k,), at given gaps, (n, n)."""
-        return np.clip(1 - gap.ravel()[self.cells] / self.reach, 0.0, 1.0)
+        """Return the fraction f = 1 - g/r of each cell."""
+        return np.clip(1 - gap / self.reach, 0.0, 1.0)
 
-    def field(self, fraction: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-        """Return the field of fractions, (n, n), from those of the cells, (k,)."""
-        field = np.zeros(shape)
-        field.ravel()[self.cells] = fraction
-        return field
+    def tension(self, gap: np.ndarray) -> np.ndarray:
+        """Return the tension s f of each cell, in E*."""
+        return self.peak * self.fraction(gap)
 
-    def tension(self, fraction: np.ndarray) -> np.ndarray:
-        """Return the tension of each cell, (k,), from its fraction, in E*."""
-        return self.peak * fraction
+    def energy(self, gap: np.ndarray) -> np.ndarray:
+        """Return the energy -W f^2 of each cell, in E* times cell size^3."""
+        return -self.work * self.fraction(gap) ** 2
 
-    def crossing_energy(self, before: np.ndarray, after: np.ndarray, gap_change: np.ndarray) -> float:
-        """Return the part of a change of energy that the mean tension does not explain, in E* times cell size^3.
+    def softening(self, gap: np.ndarray) -> np.ndarray:
+        """Return s/r of each cell that is open and within the range, in E* per cell size."""
+        return np.where((gap > 0) & (gap < self.reach), self.peak / self.reach, 0.0)
 
-        Where the gap stays within the range, the energy changes by the mean tension times the change of the gap. A cell
-        that enters or leaves the range has no tension on a part of the way.
-
-        before, after : (k,), fractions of the cells; gap_change : (n, n).
-        """
-        crossing = (before == 0) != (after == 0)
-        beyond = gap_change.ravel()[self.cells] + self.reach * (after - before)
-        return -0.5 * float(np.sum(self.tension(before + after) * beyond * crossing))
-
-    def slope(self, fraction: np.ndarray) -> np.ndarray:
-        """Return the fall of the tension with the gap, -dt/dg, of each cell, (k,), in E* per cell size."""
-        return np.where((fraction > 0) & (fraction < 1), self.peak / self.reach, 0.0)
+    def gap(self, fraction: np.ndarray) -> np.ndarray:
+        """Return the gap of each cell from its fraction, in cell sizes."""
+        return self.reach * (1 - fraction)
 
 
 @dataclass(frozen=True, eq=False)
 class Tangent:
     """First-order change of fractions and tensions with the gaps, at the k partial cells of some bonds.
 
-    With constant works the tension falls by peak/reach per gap. At a short range, the fraction of a cell also changes
-    the work of its neighbours and so their peaks, by `coupling` times the average of the changes of the fractions.
+    At a short range, the fraction of a cell also changes the work of its neighbours and so their peaks.
 
     Parameters
     ----------
     cells : (k,) int, flat indices of the cells with 0 < f < 1.
-    fraction, peak, reach : (k,), values of the cells.
-    coupling : (k,), change of the peak by the average change of the fractions around a cell; None without an effect.
-    weights : (k, k) sparse, weights of the average.
+    fraction, peak, softening : (k,), values of the cells.
+    coupling : (k, k) sparse, change of the peaks with the fractions; None without an effect.
     """
 
     cells: np.ndarray
     fraction: np.ndarray
-    peak: np.ndarray
-    reach: np.ndarray
-    coupling: np.ndarray | None = None
-    weights: csr_array | None = None
+    peak: np.ndarray | float
+    softening: np.ndarray
+    coupling: csr_array | None = None
 
     def changes(self, gap_change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the changes of fractions and tensions, (k,) each, for a change of the gaps, (n, n)."""
-        direct = -gap_change.ravel()[self.cells] / self.reach
+        tension = -self.softening * gap_change.ravel()[self.cells]
+        fraction = tension / self.peak
         if self.coupling is None:
-            return direct, self.peak * direct
-        change = direct
+            return fraction, tension
         for _ in range(_ROUNDS):
-            change = direct + (1 - self.fraction) / self.peak * self.coupling * (self.weights @ change)
-        return change, self.coupling * (self.weights @ change) + self.peak * direct
+            fraction = (tension + (1 - self.fraction) * (self.coupling @ fraction)) / self.peak
+        return fraction, tension + self.coupling @ fraction
 
 
-def neighbour_weights(cells: np.ndarray, grid: int) -> csr_array:
+def weights_between(cells: np.ndarray, grid: int) -> csr_array:
     """Return the sparse matrix of the weights w between cells of a periodic grid, (k, k)."""
     from scipy.sparse import csr_array
 
@@ -176,9 +225,70 @@ def neighbour_weights(cells: np.ndarray, grid: int) -> csr_array:
     return csr_array((np.broadcast_to(weight, present.shape)[present], neighbour[present], starts), (len(cells),) * 2)
 
 
+class AtDistance(Bonds):
+    """Law of attraction that acts across every gap: contact forms and breaks by itself.
+
+    A law is a subclass with `strength` (peak tension), `reach`, and the functions of `Bonds`. If its values differ from
+    cell to cell, it also defines `bonds_of`.
+    """
+
+    name = FINITE_RANGE
+    cells = slice(None)
+    # Rounds in which works follow the fractions, and whether cells inside a contact are held closed by the law.
+    rounds = 0
+    holds_inside = False
+    strength: float
+    reach: float
+
+    @property
+    def peak(self):
+        """Tension at zero gap, in E*."""
+        return self.strength
+
+    @property
+    def straight_strength(self) -> float:
+        """Tension at which a closed cell starts to open, in E*."""
+        return self.strength
+
+    def bonds_of(self, cells: np.ndarray | slice) -> Bonds:
+        """Return the law of some cells."""
+        return self
+
+    def bonds(self, fraction: np.ndarray) -> Bonds:
+        """Return the law of every cell; it does not depend on the fractions, (n, n)."""
+        return self.bonds_of(slice(None))
+
+    def within_reach(self, gap: np.ndarray, fraction: np.ndarray) -> np.ndarray:
+        """Return no cells, (k,) int: contact forms by the attraction at a distance."""
+        return np.zeros(0, int)
+
+    def energetic_areas(self, cells: np.ndarray, fraction: np.ndarray, mean_fraction: np.ndarray) -> np.ndarray:
+        """Return the energy of adhesion of some cells, (k,), divided by that of a cell in full contact."""
+        return self.bonds_of(cells).energy(self.bonds_of(cells).gap(fraction)) / self._full_energy
+
+    def energies(self, cells: np.ndarray, fraction: np.ndarray, mean_fraction: np.ndarray) -> np.ndarray:
+        """Return the energies of some cells, (k,), in E* times cell size^3, with the work of their tension.
+
+        The sum of this energy and of half the pressure times the height is the energy of a cell.
+        """
+        bonds = self.bonds_of(cells)
+        gap = bonds.gap(fraction)
+        return bonds.energy(gap) - 0.5 * bonds.tension(gap) * gap
+
+    @property
+    def _full_energy(self):
+        return float(np.mean(self.bonds_of(slice(None)).energy(np.zeros(1))))
+
+    def tangent(self, bonds: Bonds, fraction: np.ndarray, grid: int) -> Tangent:
+        """Return the tangent of the law at given fractions, (k,)."""
+        partial = np.flatnonzero((fraction > 0) & (fraction < 1))
+        bonds, fraction = self.bonds_of(partial), fraction[partial]
+        return Tangent(partial, fraction, bonds.peak, bonds.softening(bonds.gap(fraction)))
+
+
 @dataclass(frozen=True, eq=False)
-class Cohesive:
-    """Attraction of a range that the grid resolves.
+class Cohesive(AtDistance):
+    """Attraction of a range that the grid resolves, with linear softening.
 
     Parameters
     ----------
@@ -188,42 +298,33 @@ class Cohesive:
 
     adhesion_length: np.ndarray | float
     strength: float
-    name = FINITE_RANGE
-    rounds = 0
-    holds_inside = False
 
-    @property
-    def straight_strength(self) -> float:
-        """Peak tension of the interface, in E*."""
-        return self.strength
+    def __post_init__(self) -> None:
+        """Set the gap at which the tension falls to zero, in cell sizes; with a map, the largest one."""
+        object.__setattr__(self, "reach", float(np.max(2 * self.adhesion_length / self.strength)))
 
-    @property
-    def reach(self) -> float:
-        """Gap at which the tension falls to zero, in cell sizes; with a map, the largest one."""
-        return float(np.max(2 * self.adhesion_length / self.strength))
+    def bonds_of(self, cells: np.ndarray | slice) -> LinearBonds:
+        """Return the law of some cells."""
+        work = at_cells(self.adhesion_length, cells)
+        return LinearBonds(cells, work, 2 * work / self.strength)
 
-    @staticmethod
-    def adhesive_areas(fraction: np.ndarray, mean_fraction: np.ndarray) -> np.ndarray:
-        """Return the adhesive area of each cell, divided by the cell area: its fraction.
 
-        A partial cell has the energy -dgamma f^2 per area, and the pressure on it acts through the gap. The sum is
-        that of the pressure on the height alone, and of -dgamma f (see `BoundaryElements.stored_energy`).
-        """
+@dataclass(frozen=True, eq=False)
+class NoAttraction(AtDistance):
+    """Contact without adhesion: no bonds; contact forms where the surfaces touch."""
+
+    adhesion_length: float = 0.0
+    strength: float = 0.0
+    reach: float = 0.0
+    name = NO_ATTRACTION
+
+    def bonds_of(self, cells: np.ndarray | slice) -> LinearBonds:
+        """Return bonds without cells."""
+        return LinearBonds(np.zeros(0, int), 0.0, 1.0)
+
+    def energetic_areas(self, cells: np.ndarray, fraction: np.ndarray, mean_fraction: np.ndarray) -> np.ndarray:
+        """Return the areas of some cells, (k,), divided by the cell area."""
         return fraction
-
-    def bonds(self, fraction: np.ndarray) -> Bonds:
-        """Return the law of every cell; it does not depend on the fractions."""
-        return Bonds(slice(None), np.ravel(self.adhesion_length), np.ravel(2 * self.adhesion_length / self.strength))
-
-    def within_reach(self, gap: np.ndarray, fraction: np.ndarray) -> np.ndarray:
-        """Return no cells, (k,) int: contact forms by the attraction at a distance."""
-        return np.zeros(0, int)
-
-    def tangent(self, bonds: Bonds, fraction: np.ndarray, grid: int) -> Tangent:
-        """Return the tangent of the law at given fractions, (k,)."""
-        partial = np.flatnonzero((fraction > 0) & (fraction < 1))
-        every = np.zeros(len(partial))
-        return Tangent(partial, fraction[partial], every + bonds.peak, every + bonds.reach)
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,12 +350,15 @@ class ShortRange:
     rounds = _ROUNDS_OF_STEP
     holds_inside = True
 
-    def bonds(self, fraction: np.ndarray) -> Bonds:
+    def bonds(self, fraction: np.ndarray) -> LinearBonds:
         """Return the law of every cell, with the work at the present fractions; only neighbours of contact attract."""
-        cells = np.flatnonzero(with_neighbours(fraction > 0))
-        mean = average(fraction).ravel()[cells]
-        work = at_cells(self.adhesion_length, cells) * (1 - PERIMETER + 2 * PERIMETER * mean)
-        return Bonds(cells, work, np.sqrt(2 * BOND_COMPLIANCE * work))
+        cells, length = np.flatnonzero(with_neighbours(fraction > 0)), self.adhesion_length
+        own = at_cells(length, cells)
+        by_own = own * average(fraction).ravel()[cells]
+        # Work and perimeter term follow from one energy, so a cell also has half of the works of its neighbours.
+        by_others = by_own if np.ndim(length) == 0 else average(length * fraction).ravel()[cells]
+        work = (1 - PERIMETER) * own + PERIMETER * (by_own + by_others)
+        return LinearBonds(cells, work, np.sqrt(2 * BOND_COMPLIANCE * work))
 
     @property
     def straight_strength(self) -> float:
@@ -266,10 +370,16 @@ class ShortRange:
         """Gap at which the tension of a cell at a straight front falls to zero, in cell sizes."""
         return BOND_COMPLIANCE * self.straight_strength
 
-    @staticmethod
-    def adhesive_areas(fraction: np.ndarray, mean_fraction: np.ndarray) -> np.ndarray:
-        """Return the adhesive area of each cell, divided by the cell area: its fraction minus its perimeter term."""
-        return fraction - PERIMETER * fraction * (1 - mean_fraction)
+    def energetic_areas(self, cells: np.ndarray, fraction: np.ndarray, mean_fraction: np.ndarray) -> np.ndarray:
+        """Return the energy of adhesion of some cells, (k,), divided by that of a cell in full contact.
+
+        It is the fraction minus the perimeter term.
+        """
+        return -self.energies(cells, fraction, mean_fraction) / float(np.mean(self.adhesion_length))
+
+    def energies(self, cells: np.ndarray, fraction: np.ndarray, mean_fraction: np.ndarray) -> np.ndarray:
+        """Return the energies of some cells, (k,), in E* times cell size^3, with the work of their tension."""
+        return -at_cells(self.adhesion_length, cells) * (fraction - PERIMETER * fraction * (1 - mean_fraction))
 
     @staticmethod
     def reported_areas(fraction: np.ndarray, mean_fraction: np.ndarray) -> np.ndarray:
@@ -324,35 +434,12 @@ class ShortRange:
             closed[(row + offset[rows]) % grid, (column + offset[columns]) % grid] = True
         return closed
 
-    def tangent(self, bonds: Bonds, fraction: np.ndarray, grid: int) -> Tangent:
+    def tangent(self, bonds: LinearBonds, fraction: np.ndarray, grid: int) -> Tangent:
         """Return the tangent of the law at given fractions, (k,)."""
         partial = (fraction > 0) & (fraction < 1)
         cells, peak, reach = (np.asarray(each)[partial] for each in (bonds.cells, bonds.peak, bonds.reach))
-        coupling = 2 * PERIMETER * at_cells(self.adhesion_length, cells) / (BOND_COMPLIANCE * peak)
-        return Tangent(cells, fraction[partial], peak, reach, coupling, neighbour_weights(cells, grid))
-
-
-@dataclass(frozen=True)
-class NoAttraction:
-    """Contact without adhesion: no bonds; contact forms where the surfaces touch."""
-
-    adhesion_length: float = 0.0
-    strength: float = 0.0
-    straight_strength: float = 0.0
-    reach: float = 0.0
-    name = NO_ATTRACTION
-    rounds = 0
-    holds_inside = False
-
-    def bonds(self, fraction: np.ndarray) -> Bonds:
-        """Return bonds without work."""
-        return Bonds(np.zeros(0, int), 0.0, 1.0)
-
-    def within_reach(self, gap: np.ndarray, fraction: np.ndarray) -> np.ndarray:
-        """Return no cells, (k,) int."""
-        return np.zeros(0, int)
-
-    def tangent(self, bonds: Bonds, fraction: np.ndarray, grid: int) -> Tangent:
-        """Return the tangent of no bonds."""
-        nothing = np.zeros(0)
-        return Tangent(nothing.astype(int), nothing, nothing, nothing)
+        length = np.broadcast_to(at_cells(self.adhesion_length, cells), cells.shape)
+        coupling = weights_between(cells, grid)
+        row = np.repeat(np.arange(len(cells)), np.diff(coupling.indptr))
+        coupling.data *= PERIMETER * (length[row] + length[coupling.indices]) / (BOND_COMPLIANCE * peak[row])
+        return Tangent(cells, fraction[partial], peak, peak / reach, coupling)

@@ -22,7 +22,7 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, minres
 
 from icha.boundary_elements.elastic import HalfSpace
-from icha.boundary_elements.laws import Bonds, Cohesive, NoAttraction, ShortRange, with_neighbours
+from icha.boundary_elements.laws import AtDistance, Bonds, ShortRange, with_neighbours
 from icha.contact.model import NotConverged
 
 # Largest residual pressure at which new contact forms and closed cells open, relative to the peak tension of the bonds
@@ -85,7 +85,7 @@ class Equilibrium:
 
 def minimise(
     space: HalfSpace,
-    law: NoAttraction | ShortRange | Cohesive,
+    law: AtDistance | ShortRange,
     heights: np.ndarray,
     position: np.ndarray,
     fraction: np.ndarray,
@@ -160,7 +160,7 @@ class _Point:
     """Position of the surface of the body, and what follows from it.
 
     position, gap, pressure : (n, n), positions, gaps, and pressures without the load.
-    bonds, fraction : bonds, and the fraction of each of their cells, (k,).
+    bonds : attraction of the cells.
     force : (n, n), minus pressure and tension: without load, it opens a gap if it is positive.
     """
 
@@ -168,22 +168,21 @@ class _Point:
     gap: np.ndarray
     pressure: np.ndarray
     bonds: Bonds
-    fraction: np.ndarray
     force: np.ndarray
 
     @classmethod
     def of(cls, law, position, gap, pressure, bonds):
         """Return the point with these positions; the works of adhesion of given bonds follow their fractions."""
         for _ in range(law.rounds):
-            bonds = law.bonds(bonds.field(bonds.fraction(gap), gap.shape))
-        fraction, force = bonds.fraction(gap), -pressure
-        force.ravel()[bonds.cells] -= bonds.tension(fraction)
-        return cls(position, gap, pressure, bonds, fraction, force)
+            bonds = law.bonds(bonds.field(bonds.fraction(bonds.at(gap)), gap.shape))
+        force = -pressure
+        force.ravel()[bonds.cells] -= bonds.tension(bonds.at(gap))
+        return cls(position, gap, pressure, bonds, force)
 
     @property
     def field(self):
         """Fractions of all cells, (n, n)."""
-        return self.bonds.field(self.fraction, self.gap.shape)
+        return self.bonds.field(self.bonds.fraction(self.bonds.at(self.gap)), self.gap.shape)
 
 
 def _start(space, law, heights, position, fraction, control):
@@ -210,7 +209,7 @@ class _Line:
     """Search for the length of a step from a point `now` with residuals r along a direction d, (n, n) each."""
 
     space: HalfSpace
-    law: NoAttraction | ShortRange | Cohesive
+    law: AtDistance | ShortRange
     heights: np.ndarray
     control: Control
     now: _Point
@@ -229,7 +228,10 @@ class _Line:
         if self.now.gap.min() > 0:
             largest_gap = np.max(self.now.gap, where=self.now.gap < np.inf, initial=0.0)
             longest = float(largest_gap) / max(-float(self.d.min()), _TINY)
-        length = min(slope / max(self._curvature(stiff_d), _TINY), longest)
+        curvature = self._curvature(stiff_d)
+        length = slope / curvature if curvature * longest > slope else longest
+        if not length < np.inf:
+            raise NotConverged("the load pulls the surfaces apart")
         best, most = None, 0.0
         for trial in range(_SHORTENINGS):
             point, cut, end_slope, fall = self._try(length, stiff_d)
@@ -251,21 +253,21 @@ class _Line:
         bonds, d, stiffness = self.now.bonds, self.d, np.vdot(self.d, stiff_d)
         if self.control.rigid is not None:
             stiffness += d.sum() ** 2 / d.size / self.space.mean_compliance
-        curvature = stiffness - np.sum(bonds.slope(self.now.fraction) * d.ravel()[bonds.cells] ** 2)
+        curvature = stiffness - np.sum(bonds.softening(bonds.at(self.now.gap)) * bonds.at(d) ** 2)
         return float(curvature if curvature > _LEAST_CURVATURE * stiffness else stiffness)
 
     def _try(self, length, stiff_d):
         """Return the point at a length, whether cells were cut off at zero gap, the slope, and the fall of the energy.
 
-        The energy falls by the mean residual times the change of position, without the part where bonds did not act.
+        The energy falls by the mean residual times the change of position, and by what the mean tension leaves.
         """
-        now, law = self.now, self.law
+        now, bonds = self.now, self.now.bonds
         position, gap, cut = _project(now.position + length * self.d, self.heights, self.control)
         pressure = self.space.pressure(position) if cut else now.pressure + length * stiff_d
-        fraction, change = now.bonds.fraction(gap), position - now.position
-        point = _Point.of(law, position, gap, pressure, now.bonds)
+        point, change = _Point.of(self.law, position, gap, pressure, bonds), position - now.position
         r = point.force - _load(self.space, self.control, point, None)
-        fall = 0.5 * np.vdot(self.r + r, change) - now.bonds.crossing_energy(now.fraction, fraction, change)
+        fall = 0.5 * np.vdot(self.r + r, change)
+        fall -= bonds.energy_beyond_mean_tension(*map(bonds.at, (now.gap, gap, change)))
         return point, cut, float(np.vdot(r, self.d)), float(fall)
 
 

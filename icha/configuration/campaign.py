@@ -341,7 +341,11 @@ class Campaign(Section):
         for location, kind, value in study.states():
             if location[0] == "targets" and kind in AREAS and radii[location] < radius:
                 reason = f"lies inside the jump into contact of {material!r} on {surface!r}, which pulls off from a"
-                yield location, value, f"{reason} contact radius of {smallest}; expected larger contacts, or `indentations`"
+                yield (
+                    location,
+                    value,
+                    f"{reason} contact radius of {smallest}; expected larger contacts, or `indentations`",
+                )
                 return
 
     def resolve_paths(self, folder: FilePath) -> Campaign:
