@@ -106,7 +106,7 @@ def _pull_off_of_spheres(runs):
         logarithmic_axes(ax, "x")
         ax.set_xlabel(r"Tabor parameter  $\mu$")
     at = np.geomspace(tabor.min(), tabor.max(), 200)
-    panels[0].plot(at, sphere_pull_off_factor(at), color="0.3", lw=1, label="theory of Maugis")
+    panels[0].plot(at, [sphere_pull_off_factor(each) for each in at], color="0.3", lw=1, label="theory of Maugis")
     for limit, name, style in ((1.5, "JKR", (0, (5, 2))), (2.0, "DMT", ":")):
         panels[0].axhline(limit, color="0.3", lw=0.9, ls=style, label=name)
     panels[0].set(ylabel=r"pull-off force$\,/\,\pi\Delta\gamma R$", ylim=(1.4, 2.1))

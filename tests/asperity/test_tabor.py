@@ -19,13 +19,13 @@ def exact_pull_off_factor(tabor_parameter):
 
 @pytest.mark.parametrize("tabor_parameter", [0.03, 0.1, 0.344, 1.0, 3.0, 10.0])
 def test_pull_off_forces_are_those_of_maugis(tabor_parameter):
-    assert sphere_pull_off_factor(tabor_parameter) == pytest.approx(exact_pull_off_factor(tabor_parameter), rel=0.02)
+    assert sphere_pull_off_factor(tabor_parameter) == pytest.approx(exact_pull_off_factor(tabor_parameter), rel=2e-4)
 
 
 def test_limits_are_rigid_and_soft_spheres():
     assert sphere_pull_off_factor(1e-6) == pytest.approx(2.0) and sphere_pull_off_factor(1e6) == pytest.approx(1.5)
     assert describe_short_range(3.0) == ""
     # A glass bead of 10 um with 50 mJ/m^2 and a range of 0.5 nm.
-    assert "is 1.74 pi dgamma R by the theory of Maugis, 16 % more than for a short range" in describe_short_range(
+    assert "is 1.76 pi dgamma R by the theory of Maugis, 18 % more than for a short range" in describe_short_range(
         0.344
     )
