@@ -17,6 +17,8 @@ _MULTIPLE = re.compile(r"(?:10\^|10\*\*|1e|^|[x×*]\s*)[-+]?\d+\s*[x×*]?\s*$")
 _SPELLINGS = {"pa": "Pa", "kpa": "kPa", "mpa": "MPa", "gpa": "GPa", "pct": "percent", "per cent": "percent"}
 _SPELLINGS |= {"-": "1", "fraction": "1", "ratio": "1"}
 _SPELLINGS |= {"‰": "permille", "promille": "permille", "per mille": "permille"}
+# Units of length that are no names of quantities.
+_LENGTHS = frozenset(("nm", "um", "µm", "μm", "mm", "cm"))
 # Signs of logarithms, such as `log10 p`, `ln(p)` and `lgA`.
 _LOGARITHM = re.compile(r"(?<![a-z])(?:log(?:arithm\w*)?|ln|lg)(?:_?\d+|_?e)?[ap]?(?![a-z])", re.IGNORECASE)
 # Factors of all numbers, as in `pressure x 1e3`, `pressure * 1000`, `1000 x pressure`, `10^3 p` and `p/1000`.
@@ -58,9 +60,9 @@ def power_of_length(text: str) -> tuple[float, int] | None:
 def contradicting_unit(title: str, unit: str, si_unit: str) -> str | None:
     """Return the unit that a title states if it is not `unit`, a unit of pressure (Pa) or ratio (1); else None."""
     for text, before, certain in _possible_units(title):
-        # Outside brackets, words such as `count` are names, and `p_m` is not in metres.
+        # Outside brackets, words such as `count` are names, and `p_m` is not in metres; `radius um` is in micrometres.
         found = _meaning(text)
-        if found is None or (not certain and found in [("1", 1.0), ("m", 1)]):
+        if found is None or (not certain and (found == ("1", 1.0) or found == ("m", 1) and text not in _LENGTHS)):
             continue
         agrees = found[0] == si_unit and math.isclose(found[1], conversion_factor(unit, si_unit))
         return None if agrees and not _MULTIPLE.search(before) else text

@@ -113,6 +113,7 @@ def test_measurements_that_cannot_be_drawn(table, changes, message, load, tmp_pa
         ("p_MPa_mean", "kPa", "area", "percent", "states 'MPa'"),
         ("pressure (kPa)", "1", "area", "percent", "states 'kPa'"),
         ("pressure", "kPa", "area (mm^2)", "percent", "states 'mm^2'"),
+        ("pressure", "kPa", "Radius um", "percent", "states 'um'"),
         ("pressure (N/mm²)", "MPa", "A/A0 [%]", "percent", None),
         ("pressure", "kPa", "area [‰]", "percent", "states '‰'"),
         ("pressure", "kPa", "A in ‰", "percent", "states '‰'"),

@@ -16,8 +16,9 @@ _FEWEST_BLOCKS, _EDGE = 8, 3
 # Largest fraction of points that can be replaced. Up to this fraction of single outliers, the error of the rms slope is
 # below 1 % on a surface with 8 points per shortest wave.
 MOST_OUTLIERS = 0.2
-# Largest number of rows and columns in which a repeated height is sought.
-_MOST_EXAMINED = 1000
+# Largest fraction of points at exactly one height that is not conspicuous, and largest number of rows and columns in
+# which such a height is sought.
+_MOST_REPEATED, _MOST_EXAMINED = 2e-3, 1000
 # Robust standard deviation of normal values, divided by their median absolute deviation.
 _NORMAL = 1.4826
 # Distance of the 5th and the 95th percentile of normal values, divided by their standard deviation.
@@ -130,17 +131,17 @@ def _with_steep_edge(found, level, high):
 
 
 def repeated_height(heights: np.ndarray) -> str:
-    """Describe the height of more than a fifth of the points, if no other height is a tenth as frequent; "" without.
+    """Describe the height of more than 0.2 % of the points, if no other height is a tenth as frequent; "" without.
 
-    Such a number usually marks missing points, or a scan that is saturated. Fewer such points are outliers.
+    Such a number usually marks missing points, or a scan that is saturated.
     """
     step = max(1, *(points // _MOST_EXAMINED for points in heights.shape))
     examined = heights[::step, ::step]
     values, counts = np.unique(examined[np.isfinite(examined)], return_counts=True)
     *others, most = np.sort(counts)[-2:].tolist() if len(counts) else [0]
-    if most <= MOST_OUTLIERS * examined.size or 10 * max(others, default=0) > most:
+    if most <= _MOST_REPEATED * examined.size or 10 * max(others, default=0) > most:
         return ""
-    return f"{100 * most / examined.size:.0f} % of the points at exactly {length(values[np.argmax(counts)])}"
+    return f"{100 * most / examined.size:.2g} % of the points at exactly {length(values[np.argmax(counts)])}"
 
 
 def line_offsets(level: np.ndarray) -> dict[str, float]:
