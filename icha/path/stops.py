@@ -129,6 +129,8 @@ def describe_separation(contact: ContactModel, state: State) -> str:
 
 # A jump of at most this number of cells is due to the grid.
 _FEW_CELLS = 4
+# Part of the way back to a target inside a jump, by which the surfaces are pulled further to see whether tension grows.
+_PULLED_FURTHER = 0.25
 
 
 class InsideJump(NotConverged):
@@ -212,9 +214,15 @@ def _solve_after_jump(target, before, after):
         found = target.solve(after, after.separation)
     except NotConverged:
         raise InsideJump(target, before, after) from None
-    pulled = before.separation > after.separation < found.separation
-    if pulled and contact.pressure(found) < 0 and contact.stiffness(found) < 0:
-        raise InsideJump(target, before, after)
+    pulled = found.separation - after.separation
+    if after.separation < before.separation and pulled > 0 and contact.pressure(found) < 0:
+        # Not by the stiffness, which varies when a front moves across cells.
+        try:
+            beyond = contact.equilibrium(found, found.separation + _PULLED_FURTHER * pulled)
+        except NotConverged:
+            raise InsideJump(target, before, after) from None
+        if contact.pressure(beyond) > contact.pressure(found):
+            raise InsideJump(target, before, after)
     return found
 
 
