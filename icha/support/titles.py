@@ -62,7 +62,7 @@ def contradicting_unit(title: str, unit: str, si_unit: str) -> str | None:
     for text, before, certain in _possible_units(title):
         # Outside brackets, words such as `count` are names, and `p_m` is not in metres; `radius um` is in micrometres.
         found = _meaning(text)
-        if found is None or (not certain and (found == ("1", 1.0) or found == ("m", 1) and text not in _LENGTHS)):
+        if found is None or (not certain and (found == ("1", 1.0) or (found == ("m", 1) and text not in _LENGTHS))):
             continue
         agrees = found[0] == si_unit and math.isclose(found[1], conversion_factor(unit, si_unit))
         return None if agrees and not _MULTIPLE.search(before) else text
