@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -42,6 +43,7 @@ def self_affine_integral(order: int, start: float, end: float, roll: float, hurs
     return up_to(end) - up_to(start)
 
 
+@lru_cache
 def self_affine_full_contact_energy(
     period: float, rolloff_wavelength: float, short_wavelength: float, hurst: float
 ) -> float:
@@ -97,6 +99,7 @@ class SpectralMoments(NamedTuple):
         return SpectralMoments(*(moment * factor for moment in self))
 
 
+@lru_cache
 def self_affine_moments(
     period: float, rolloff_wavelength: float, short_wavelength: float, hurst: float
 ) -> SpectralMoments:
