@@ -65,11 +65,25 @@ def adhesive_contacts(campaign: Campaign, surface: str) -> list[dict]:
     ]
 
 
+def surface_sha256(campaign: Campaign, name: str, seed: int) -> str:
+    """Compute the SHA-256 of all settings and files that determine a surface."""
+    return _sha256([seed, *_surface_and_file(campaign, name)])
+
+
 def run_sha256(campaign: Campaign, case: RunLabels) -> str:
     """Compute the SHA-256 of all settings and files that determine the results of a run."""
-    topography = campaign.topography(case.surface)
-    file = [topography.sha256] if topography else []
-    return _sha256([run_settings(campaign, case), surface_settings(campaign, case.surface), *file])
+    return _sha256([run_settings(campaign, case), *_surface_and_file(campaign, case.surface)])
+
+
+def theories_sha256(campaign: Campaign, surface: str, seed: int) -> str:
+    """Compute the SHA-256 of all settings and files that determine the theories of a surface."""
+    return _sha256([seed, adhesive_contacts(campaign, surface), *_surface_and_file(campaign, surface)])
+
+
+def _surface_and_file(campaign: Campaign, name: str) -> list:
+    """Return the settings of a surface, and the checksum of its file if it has one."""
+    topography = campaign.topography(name)
+    return [surface_settings(campaign, name), *([topography.sha256] if topography else [])]
 
 
 def campaign_sha256(campaign: Campaign, of_run: Callable[[RunLabels], str] | None = None) -> str:

@@ -226,7 +226,6 @@ def write_campaign(
     path: str | os.PathLike,
     *,
     design: Iterable[RunLabels | tuple] | None = None,
-    settings: Mapping[RunLabels | tuple, str] = {},
     attrs: Mapping[str, str] = {},
     varied: Mapping[str, Mapping[str, tuple[str, str, dict]]] = {},
 ) -> None:
@@ -242,7 +241,6 @@ def write_campaign(
     path : the file to write. A file appears only when it is complete. The same runs give the same bytes.
     design : labels of all runs of the campaign. Default: the labels in `runs`. Other combinations of these labels have
         the status `not_in_design`.
-    settings : expected checksums of the settings of runs (attribute `config_sha256`), by the labels of the runs.
     varied : for each study, its varied parameters by name: label on which the parameter depends (surface or material),
         unit, and value for each value of the label. They become coordinates.
     attrs : global attributes of the file (title, summary, campaign, license, …).
@@ -250,13 +248,13 @@ def write_campaign(
     Raises
     ------
     ValueError
-        If a run is given twice, is not in the design, or was computed with other settings than expected; if runs differ
-        in a value that they must share; if a file cannot be read. The message names the run.
+        If a run is given twice or is not in the design; if runs differ in a value that they must share; if a file
+        cannot be read. The message names the run.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryFile(dir=path.parent) as spool:
-        studies = arrange_runs(spool_runs(runs, spool, settings), design)
+        studies = arrange_runs(spool_runs(runs, spool), design)
         with whole_file(path) as temporary, netCDF4.Dataset(temporary, "w") as file:
             origins = [each for study in studies for each in study.origins]
             names = [study.name for study in studies]

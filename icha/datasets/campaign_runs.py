@@ -104,20 +104,18 @@ class Entry(NamedTuple):
         return self.status not in _ENDED_EARLY, len(self.names), self.sizes.get("step", 0)
 
 
-def spool_runs(
-    runs: Iterable[LabelledRun], spool: BinaryIO, settings: Mapping[RunLabels | tuple, str] = {}
-) -> dict[str, dict[RunLabels, Entry]]:
+def spool_runs(runs: Iterable[LabelledRun], spool: BinaryIO) -> dict[str, dict[RunLabels, Entry]]:
     """Append the values of every run to a temporary file; return the entries of all runs, by study and labels.
 
     Parameters
     ----------
-    runs, settings : as in `icha.datasets.campaign_file.write_campaign`.
+    runs : as in `icha.datasets.campaign_file.write_campaign`.
     spool : the temporary file.
 
     Raises
     ------
     ValueError
-        If a run is given twice, or was computed with other settings than expected. The message names the run.
+        If a run is given twice. The message names the run.
     """
     studies: dict[str, dict[RunLabels, Entry]] = {}
     # Most runs have the same variables and snapshots. Each combination is stored only once.
@@ -128,12 +126,6 @@ def spool_runs(
         if labels in entries:
             raise ValueError(f"{labels}: this run is given twice")
         values, attrs = _values_of(source) if isinstance(source, xr.Dataset) else read_run_values(source)
-        if attrs.get("config_sha256") != settings.get(labels, attrs.get("config_sha256")):
-            file = labels if isinstance(source, xr.Dataset) else source
-            raise ValueError(
-                f"{file}: this run was computed with other settings than those of the configuration. Remove the file "
-                "and repeat the command, which computes the run again"
-            )
         names, snapshots = frozenset(values), _snapshots_of(values)
         entries[labels] = Entry(
             labels,

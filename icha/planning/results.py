@@ -3,10 +3,11 @@
 from dataclasses import dataclass
 
 from icha.configuration.campaign import Campaign
-from icha.configuration.cases import run_cases, surface_cases
+from icha.configuration.cases import run_cases, run_sha256, surface_cases, surface_sha256, theories_sha256
 from icha.contact.models import REFERENCE_MODEL
 from icha.datasets import results
 from icha.datasets.labels import RunLabels
+from icha.datasets.stamp import Stamp, program_of_runs, program_of_surfaces, program_of_theories
 
 
 @dataclass(frozen=True)
@@ -99,6 +100,30 @@ def campaign_files(campaign: Campaign, folder: str = "") -> CampaignFiles:
         configuration=path(results.CONFIGURATION),
         deposit=path(results.DEPOSIT, version=campaign.deposit_metadata().version or "without_version"),
     )
+
+
+def expected_stamps(campaign: Campaign, folder: str = "") -> dict[str, Stamp]:
+    """Return the stamps of all surfaces, runs and theories of a campaign, by path; each path begins with `folder`."""
+    files, license = campaign_files(campaign), campaign.deposit_metadata().license
+    first_seeds = dict(reversed(files.surfaces.values()))
+    stamps = {
+        path: (surface_sha256(campaign, name, seed), program_of_surfaces())
+        for path, (name, seed) in files.surfaces.items()
+    }
+    stamps |= {path: (run_sha256(campaign, case), program_of_runs(case.model)) for path, case in files.runs.items()}
+    stamps |= {
+        path: (theories_sha256(campaign, name, first_seeds[name]), program_of_theories())
+        for path, name in files.theories.items()
+    }
+    return {
+        f"{folder}/{path}" if folder else path: {
+            "id": f"{campaign.name}/{path.removesuffix('.nc')}",
+            "license": license,
+            "config_sha256": settings,
+            "program_sha256": program,
+        }
+        for path, (settings, program) in stamps.items()
+    }
 
 
 def _has_answers(campaign, cases):

@@ -224,3 +224,21 @@ def sha256_of(file: Path) -> str:
 def _files_in(folder: Path) -> list[Path]:
     """Return all files in a folder and its subfolders, sorted, without the timestamp files of Snakemake."""
     return sorted(each for each in folder.rglob("*") if each.is_file() and each.name != ".snakemake_timestamp")
+
+
+def refuse_changed(file: str | os.PathLike, sha256: str, name: str | os.PathLike | None = None) -> None:
+    """Raise an error if a file has changed; otherwise the results would be attributed to the old content.
+
+    Parameters
+    ----------
+    file : path of the file.
+    sha256 : expected checksum of the file.
+    name : original name of a copied file, for the message.
+
+    Raises
+    ------
+    ValueError
+        If the checksum differs.
+    """
+    if sha256_of(Path(file)) != sha256:
+        raise ValueError(f"{name or file} has changed since the campaign started; repeat the command")

@@ -325,13 +325,3 @@ def test_runs_that_do_not_fit_are_refused_by_name():
     ):
         with pytest.raises(ValueError, match=message):
             campaign_tree(runs, design=design)
-
-
-def test_a_run_of_other_settings_than_are_asked_for_is_refused_by_its_file(tmp_path):
-    (labels, run), *_ = small.runs()
-    write_dataset(run.assign_attrs(config_sha256="a" * 64), tmp_path / "run.nc")
-    pairs = [(tuple(labels), tmp_path / "run.nc")]
-    write_campaign(pairs, tmp_path / "c.nc", settings={tuple(labels): "a" * 64})
-    with pytest.raises(ValueError, match=rf"{tmp_path}/run.nc: this run was computed with other settings"):
-        write_campaign(pairs, tmp_path / "other.nc", settings={tuple(labels): "b" * 64})
-    assert not (tmp_path / "other.nc").exists()

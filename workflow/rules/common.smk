@@ -14,7 +14,7 @@ from fingerprint import code_fingerprint
 from icha.configuration.load import collect_inputs
 from icha.configuration.cases import run_sha256
 from icha.datasets import results
-from icha.planning.results import campaign_files
+from icha.planning.results import campaign_files, expected_stamps
 
 before_jobs.plan_without_collecting()
 
@@ -24,6 +24,7 @@ PUBLICATION = CAMPAIGN.deposit_metadata()
 RESULTS = f"results/{CAMPAIGN.name}"
 # All results with their labels.
 FILES = campaign_files(CAMPAIGN, RESULTS)
+STAMPS = expected_stamps(CAMPAIGN, RESULTS)
 
 # Files that the configuration names are copied to the folder of the configuration as used.
 CONFIG_TEXT, NAMED_FILES = collect_inputs(CONFIGURATION)

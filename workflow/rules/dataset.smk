@@ -51,7 +51,7 @@ rule campaign_dataset:
     params:
         labels=[tuple(labels) for labels in FILES.runs.values()],
         varied=as_it_is(varied_values(CAMPAIGN)),
-        settings=[SHA256_OF_RUN(labels) for labels in FILES.runs.values()],
+        stamps=[STAMPS[file] for file in FILES.runs],
         size=len(FILES.runs),
         attributes=as_it_is(
             ATTRIBUTES

@@ -22,7 +22,7 @@ rule reference:
     params:
         settings=lambda wildcards: surface_settings(CAMPAIGN, wildcards.surface),
         adhesive=lambda wildcards: adhesive_contacts(CAMPAIGN, wildcards.surface),
-        attributes=as_it_is(ATTRIBUTES),
+        attributes=lambda wildcards: ATTRIBUTES | STAMPS[f"{RESULTS}/{results.THEORIES}".format(**wildcards)],
         code=code_of("make_references.py"),
     message:
         "Theories and literature for surface {wildcards.surface}"

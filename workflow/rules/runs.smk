@@ -37,10 +37,8 @@ rule run:
     params:
         settings=lambda wildcards: SETTINGS_OF_RUN(case_of(wildcards)),
         attributes=lambda wildcards: ATTRIBUTES
-        | {
-            "study": wildcards.study,
-            "config_sha256": SHA256_OF_RUN(case_of(wildcards)),
-        },
+        | {"study": wildcards.study}
+        | STAMPS[f"{RESULTS}/{results.RUN}".format(**wildcards)],
         code=by_case(lambda case: CODE_OF_RUN[case.model]),
         # A run that takes hours can be resumed from checkpoints.
         resumable=by_case(lambda case: MODELS[case.model].resumable and surface_threads(CAMPAIGN, case.surface) > 1),

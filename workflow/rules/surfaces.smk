@@ -27,7 +27,7 @@ rule surface:
         settings=lambda wildcards: surface_settings(CAMPAIGN, wildcards.surface),
         # Files are compared by content, not by time.
         sha256=lambda wildcards: getattr(CAMPAIGN.topography(wildcards.surface), "sha256", None),
-        attributes=as_it_is(ATTRIBUTES),
+        attributes=lambda wildcards: ATTRIBUTES | STAMPS[f"{RESULTS}/{results.SURFACE}".format(**wildcards)],
         code=code_of("make_surface.py"),
     message:
         "Surface {wildcards.surface}, seed {wildcards.seed}"

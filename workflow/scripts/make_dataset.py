@@ -3,13 +3,14 @@
 from job import attributes, job_context
 
 from icha.datasets.campaign_file import write_campaign
+from icha.datasets.stamp import refuse_outdated
 
 
-def make_dataset(runs, output, *, labels, settings, attributes, varied=()):
-    """Combine run files into a campaign dataset, with the labels and the checksum of the settings of each run."""
-    settings = dict(zip(labels, settings, strict=True))
+def make_dataset(runs, output, *, labels, stamps, attributes, varied=()):
+    """Combine run files into a campaign dataset, with the labels and the expected stamp of each run."""
+    refuse_outdated(dict(zip(runs, stamps, strict=True)))
     pairs = zip(labels, runs, strict=True)
-    write_campaign(pairs, output, design=labels, settings=settings, attrs=attributes, varied=dict(varied))
+    write_campaign(pairs, output, design=labels, attrs=attributes, varied=dict(varied))
 
 
 if "snakemake" in globals():
@@ -18,7 +19,7 @@ if "snakemake" in globals():
             snakemake.input,
             snakemake.output[0],
             labels=snakemake.params.labels,
-            settings=snakemake.params.settings,
+            stamps=snakemake.params.stamps,
             attributes=attributes(snakemake),
             varied=snakemake.params.varied,
         )

@@ -1,45 +1,15 @@
 """Write predictions of theories for a surface, and data points from publications."""
 
-from job import attributes, job_context
+from job import job_context
 
-from icha.asperity.material import Material
-from icha.datasets.files import write_dataset
-from icha.datasets.surface_file import read_spectral_moments
-from icha.references.theories import reference_dataset
-from icha.surfaces.spectrum import SelfAffineSpectrum
-
-
-def make_references(surface, output, *, settings, adhesive, attributes):
-    """Write the references for a surface: predictions of theories, and published data points.
-
-    Theories of separate summits are omitted if they do not apply to the surface or the materials.
-
-    Parameters
-    ----------
-    surface, output : surface file to read, and file to write.
-    settings : settings of the surface, in SI units.
-    adhesive : rms slopes and materials of the contacts with adhesion, in SI units.
-    attributes : attributes of the dataset.
-    """
-    keys = ("period", "rolloff_wavelength", "short_wavelength", "hurst")
-    known = settings["kind"] == "self_affine"
-    spectrum = SelfAffineSpectrum(**{key: settings[key] for key in keys}) if known else None
-    materials = {(each["rms_slope"], each["name"]): Material(**each["material"]) for each in adhesive}
-    moments = read_spectral_moments(surface)
-    try:
-        dataset = reference_dataset(spectrum, moments, materials, attrs=attributes)
-    except ValueError as error:
-        print(f"Theories of separate summits do not apply to this surface: {error}")
-        dataset = reference_dataset(spectrum, attrs=attributes)
-    write_dataset(dataset, output)
-
+from icha.tasks.theories import make_theories
 
 if "snakemake" in globals():
     with job_context(snakemake):
-        make_references(
+        make_theories(
             snakemake.input.surface,
             snakemake.output[0],
             settings=snakemake.params.settings,
             adhesive=snakemake.params.adhesive,
-            attributes=attributes(snakemake),
+            attributes=snakemake.params.attributes,
         )
