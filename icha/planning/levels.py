@@ -24,8 +24,7 @@ from icha.datasets.files import read_campaign
 from icha.datasets.labels import coarse_study
 from icha.datasets.results import CHOSEN_LEVELS
 from icha.path.targets import AREAS
-from icha.planning.costs import WORKFLOW
-from icha.planning.plan import plan
+from icha.planning.plan import RUNS, plan
 from icha.planning.results import campaign_files
 from icha.support.atomic_files import whole_file
 from icha.support.formatting import format_count
@@ -86,7 +85,7 @@ def choose_levels(campaign: Campaign, results: Path, cores: int) -> dict[str, Ch
 
 def _costs(campaign, results) -> dict[str, dict[str, float]]:
     """Return the expected time of one seed of each level with all its contacts, s, for each study."""
-    seconds = {item.path: item.work + WORKFLOW.job for item in plan(campaign, results) if item.is_run}
+    seconds = {item.path: item.work for item in plan(campaign, results) if item.part == RUNS}
     times: dict[tuple[str, str], list[float]] = {}
     seeds: dict[tuple[str, str], set[int]] = {}
     for path, case in campaign_files(campaign).runs.items():

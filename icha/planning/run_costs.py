@@ -1,0 +1,63 @@
+"""Expected cost of the runs of a campaign."""
+
+import math
+from functools import cache
+
+from icha.configuration.campaign import Campaign
+from icha.configuration.cases import run_cases, run_settings
+from icha.configuration.plausibility import energy_ratio
+from icha.datasets.labels import RunLabels
+from icha.path.targets import QUANTITIES
+from icha.planning import costs
+from icha.planning.validity import surface_facts
+
+# Assumed reduced pressure of a target that is given as a mean separation.
+_UNKNOWN_LOAD = 0.03
+
+
+def run_costs(campaign: Campaign) -> dict[RunLabels, costs.Cost]:
+    """Return the expected cost of each run; runs that differ only in the seed have the same cost."""
+
+    @cache
+    def summits(surface):
+        # Few summits of an indenter come into contact.
+        return 1 if campaign.surfaces[surface].shape else surface_facts(campaign, surface)["summits"]
+
+    cost = cache(lambda case: expected_cost(campaign, case, summits(case.surface)))
+    return {case: cost(case._replace(seed=0)) for case in run_cases(campaign)}
+
+
+def expected_cost(campaign: Campaign, case: RunLabels, summits: float) -> costs.Cost:
+    """Return the expected cost of a run; `summits` is the number of summits of its surface."""
+    sweep = _cost_parameters(run_settings(campaign, case), campaign.period(case.surface))
+    # The contact of a shape stays small, however sticky its roughness is.
+    spreads = sweep["adhesive"] and campaign.surfaces[case.surface].shape is None
+    ratio = energy_ratio(campaign, case) if spreads else math.inf
+    grid, free = campaign.grid(case.surface), campaign.is_free(case.surface)
+    return costs.run_cost(case.model, grid, summits, energy_ratio=ratio, free=free, **sweep)
+
+
+def _cost_parameters(settings, side) -> dict:
+    """Convert the settings of a run to arguments of `run_cost`; `side` is the side of the surface, m."""
+    path, snapshots = settings["path"], settings["path"]["snapshots"]
+    modulus, slope = settings["material"]["contact_modulus"], settings["rms_slope"]
+    # Reduced pressure of a target; about half of an area fraction, and `_UNKNOWN_LOAD` if the pressure is unknown.
+    loads = {
+        "reduced_pressure": lambda value: value,
+        "relative_load": lambda value: value / (slope or 1.0),
+        "pressure": lambda value: value / (modulus * (slope or 1.0)),
+        "force": lambda value: value / (modulus * side**2 * (slope or 1.0)),
+        "area_fraction": lambda value: value / 2,
+        "contact_radius": lambda value: math.pi * value**2 / side**2 / 2,
+    }
+    stops = {(kind, value) for kind, each in QUANTITIES.items() for value in path.get(each.plural) or ()}
+    stops |= {tuple(snapshot) for snapshot in snapshots or ()}
+    return {
+        # Targets in tension have few spots.
+        "load": max(0.0, *(loads[kind](value) if kind in loads else _UNKNOWN_LOAD for kind, value in stops)),
+        "stops": len(stops),
+        "snapshots": 1 if snapshots is None else len(snapshots),
+        "adhesive": settings["material"]["surface_energy"] > 0,
+        "legs": len(path.get("turning_points", ())) + bool(path.get("unload")),
+        "max_step": path["max_step"],
+    }
