@@ -2,6 +2,7 @@
 # One configuration file describes one campaign: config/config.yaml, or the file of --configfile. See config/README.md.
 
 import os
+import shlex
 import sys
 
 # Files in this folder or in the working directory must not replace modules, unless PYTHONPATH names these folders.
@@ -10,35 +11,34 @@ LOCAL_FOLDERS = {os.path.realpath(ROOT), os.path.realpath("")}
 REQUESTED = os.environ.get("PYTHONPATH", "").split(os.pathsep)
 sys.path.sort(key=lambda folder: os.path.realpath(folder) in LOCAL_FOLDERS and folder not in filter(None, REQUESTED))
 
+# The same for jobs. Snakemake inserts the path of Python into shell commands without quotes.
+os.environ["PYTHONSAFEPATH"] = "1"
+sys.executable = shlex.quote(sys.executable)
+
 from snakemake.utils import min_version
 
 min_version("9.17")
 
 
 include: "workflow/rules/common.smk"
-include: "workflow/rules/surfaces.smk"
+
+
+# The stamp of a file decides whether the file is valid. Snakemake computes missing files, so outdated files are removed.
+if workflow.is_main_process:
+    campaign = prepare.Results(
+        RESULTS, CAMPAIGN.name, CONFIGURATION.origin, ROOT, STAMPS, dry_run=workflow.output_settings.dryrun
+    )
+
+
+include: "workflow/rules/inputs.smk"
 include: "workflow/rules/runs.smk"
-include: "workflow/rules/references.smk"
-include: "workflow/rules/dataset.smk"
+include: "workflow/rules/analysis.smk"
 include: "workflow/rules/figures.smk"
 include: "workflow/rules/report.smk"
 include: "workflow/rules/publish.smk"
 
 
-before_jobs.prepare_process()
-
-if workflow.is_main_process:
-    before_jobs.end_with_caller()
-    campaign = before_jobs.CampaignResults(
-        RESULTS, CAMPAIGN.name, CONFIGURATION.origin, ROOT, dry_run=workflow.output_settings.dryrun
-    )
-    campaign.have_stale_made_again([FILES.configuration, *COPIED, *FILES.computed, FILES.run_times], workflow.rules)
-else:
-    before_jobs.refuse_superseded()
-
-
 onstart:
-    before_jobs.start_jobs_freely(workflow)
     campaign.begin()
 
 
@@ -62,13 +62,7 @@ localrules:
     report,
     publish,
     configuration,
-    campaign_dataset,
-    table,
-    comparison,
-    model_error,
-    answers,
-    sensitivity,
-    checks,
+    analyse,
     verdict,
     figure,
     report_page,
@@ -82,6 +76,7 @@ rule all:
         FILES.configuration,
         list(COPIED),
         FILES.computed,
+        FILES.checksums,
 
 
 rule surfaces:
@@ -112,6 +107,7 @@ rule dataset:
         FILES.sensitivity,
         FILES.checks,
         FILES.verdict,
+        FILES.checksums,
 
 
 rule figures:

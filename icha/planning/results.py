@@ -8,6 +8,7 @@ from icha.contact.models import REFERENCE_MODEL
 from icha.datasets import results
 from icha.datasets.labels import RunLabels
 from icha.datasets.stamp import Stamp, program_of_runs, program_of_surfaces, program_of_theories
+from icha.support.checksums import CHECKSUMS
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,7 @@ class CampaignFiles:
     sensitivity: list[str]
     checks: str
     verdict: str
+    checksums: str
     figures: list[str]
     report: str
     run_times: str
@@ -45,7 +47,7 @@ class CampaignFiles:
 
     @property
     def computed(self) -> list[str]:
-        """Paths of all results except the copy of the configuration and the deposit."""
+        """Paths of all results except the copy of the configuration, the checksums and the deposit."""
         return [
             *self.surfaces,
             *self.runs,
@@ -60,6 +62,21 @@ class CampaignFiles:
             self.verdict,
             *self.figures,
             self.report,
+        ]
+
+    @property
+    def verified(self) -> list[str]:
+        """Paths of all results that are in the list of checksums, except checks and verdict."""
+        return [
+            *self.surfaces,
+            *self.runs,
+            *self.theories,
+            self.dataset,
+            self.table,
+            self.comparison,
+            *self.model_error,
+            *self.answers,
+            *self.sensitivity,
         ]
 
 
@@ -90,6 +107,7 @@ def campaign_files(campaign: Campaign, folder: str = "") -> CampaignFiles:
         sensitivity=[path(results.SENSITIVITY)] if any(each.sample for each in campaign.studies.values()) else [],
         checks=path(results.CHECKS),
         verdict=path(results.VERDICT),
+        checksums=path(CHECKSUMS),
         figures=[
             path(results.FIGURE, name=name, ending=ending)
             for name in campaign.figures.by_name()

@@ -5,7 +5,6 @@ from icha.datasets.results import ResultFiles
 from icha.figures.own_figure import modules_of
 from icha.figures.registry import declaration_of, module_name
 from icha.planning.requirements import figure_memory
-from icha.support.checksums import sha256_of
 
 RESULT_FILES = ResultFiles(CAMPAIGN.name, RESULTS)
 FIGURES = CAMPAIGN.figures.by_name()

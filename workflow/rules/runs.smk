@@ -1,49 +1,52 @@
-# One job for each run. Runs of other models than the asperity model are in a folder with the name of the model.
+# Runs. One job computes a batch of short runs or one long run. A failed run does not fail its batch.
 
 from icha.configuration.cases import run_settings
-from icha.contact.models import MODELS
-from icha.datasets.labels import model_folder
-from icha.planning.requirements import run_memory, run_minutes, surface_threads
+from icha.datasets.results import SURFACE
+from icha.planning.requirements import run_memory, run_minutes
 
 
-wildcard_constraints:
-    model_folder="|".join(map(model_folder, MODELS)),
+def surface_of(case):
+    """Return the path of the surface of a run."""
+    return f"{RESULTS}/{SURFACE}".format(surface=case.surface, seed=case.seed)
 
 
-# Snakemake needs the settings of each run several times, for up to ten thousand runs.
-SETTINGS_OF_RUN = cache(lambda case: run_settings(CAMPAIGN, case))
+def run_arguments(path):
+    """Return the arguments of the task that computes a run."""
+    case = FILES.runs[path]
+    return run_settings(CAMPAIGN, case) | {
+        "surface": surface_of(case),
+        "attributes": ATTRIBUTES | {"study": case.study} | STAMPS[path],
+        "resumable": is_resumable(CAMPAIGN, case),
+    }
 
-# Each model has its own fingerprint, because the script imports the module of the model.
-CODE_OF_RUN = {name: code_of("run_sweep.py", model.module) for name, model in MODELS.items()}
 
+for batch in run_batches(CAMPAIGN, FILES.runs):
+    cases = [FILES.runs[path] for path in batch.files]
 
-rule run:
-    input:
-        surface="<results>/surfaces/{surface}/seed{seed}.nc",
-    output:
-        "<results>/runs/<run>.nc",
-    log:
-        "<logs>/runs/<run>.log",
-    benchmark:
-        "<benchmarks>/runs/<run>.jsonl"
-    # Long runs start first; otherwise, at the end, one long run could occupy one core while other cores are idle.
-    priority: by_case(lambda case: int(MODELS[case.model].resumable))
-    conda:
-        "../envs/icha.yaml"
-    threads: by_case(lambda case: surface_threads(CAMPAIGN, case.surface))
-    resources:
-        mem_mb=by_case(lambda case: run_memory(CAMPAIGN, case)),
-        runtime=by_case(lambda case: run_minutes(CAMPAIGN, case)),
-    params:
-        settings=lambda wildcards: SETTINGS_OF_RUN(case_of(wildcards)),
-        attributes=lambda wildcards: ATTRIBUTES
-        | {"study": wildcards.study}
-        | STAMPS[f"{RESULTS}/{results.RUN}".format(**wildcards)],
-        code=by_case(lambda case: CODE_OF_RUN[case.model]),
-        # A run that takes hours can be resumed from checkpoints.
-        resumable=by_case(lambda case: MODELS[case.model].resumable and surface_threads(CAMPAIGN, case.surface) > 1),
-    message:
-        "Sweep {wildcards.study}: {wildcards.surface}, seed {wildcards.seed}, slope {wildcards.slope}, "
-        "{wildcards.model_folder}{wildcards.material}"
-    script:
-        "../scripts/run_sweep.py"
+    rule:
+        name:
+            rule_name("run", batch)
+        input:
+            ancient(list(dict.fromkeys(map(surface_of, cases)))),
+        output:
+            [update(path) for path in batch.files],
+        log:
+            f"<logs>/runs/{batch.name}.log",
+        benchmark:
+            f"<benchmarks>/runs/{batch.name}.jsonl"
+        # Long batches start first; otherwise, at the end, one long run could occupy one core while others are idle.
+        priority: int(batch.seconds)
+        conda:
+            "../envs/icha.yaml"
+        threads: max(surface_threads(CAMPAIGN, case.surface) for case in cases)
+        resources:
+            mem_mb=max(run_memory(CAMPAIGN, case) for case in cases),
+            runtime=max(run_minutes(CAMPAIGN, case) for case in cases),
+        params:
+            files=as_it_is(LongList(map(run_arguments, batch.files))),
+            label=batch.name,
+            count=len(batch.files),
+        message:
+            "Runs {params.label}, {params.count} runs"
+        script:
+            "../scripts/run_batch.py"

@@ -1,9 +1,13 @@
-"""Write the verdict on the checks; the job fails if a check has failed, except for known failures."""
+"""Write the verdict on the checks, and the checksums of all results before figures and report.
+
+The job fails if a check has failed, except for known failures.
+"""
 
 from job import job_context
 
 from icha.analysis.checks import read_checks, refuse_unknown_failures
 from icha.support.atomic_files import whole_file
+from icha.support.checksums import write_checksums
 
 
 def judge_results(checks, output, *, known):
@@ -35,4 +39,6 @@ def judge_results(checks, output, *, known):
 
 if "snakemake" in globals():
     with job_context(snakemake):
-        judge_results(snakemake.input[0], snakemake.output[0], known=snakemake.params.known)
+        inputs, outputs = snakemake.input, snakemake.output
+        judge_results(inputs.checks, outputs.verdict, known=snakemake.params.known)
+        write_checksums(snakemake.params.results, [inputs.checks, *inputs.others, outputs.verdict], outputs.checksums)

@@ -1,15 +1,9 @@
-"""Write predictions of theories for a surface, and data points from publications."""
+"""Write predictions of theories for surfaces, and data points from publications."""
 
-from job import job_context
+from job import compute_batch, job_context
 
 from icha.tasks.theories import make_theories
 
 if "snakemake" in globals():
     with job_context(snakemake):
-        make_theories(
-            snakemake.input.surface,
-            snakemake.output[0],
-            settings=snakemake.params.settings,
-            adhesive=snakemake.params.adhesive,
-            attributes=snakemake.params.attributes,
-        )
+        compute_batch(snakemake.output, snakemake.params.files, make_theories)

@@ -1,0 +1,117 @@
+# The configuration as used, topographies at rms slope 1 (shared by all slopes and materials), and theories.
+
+from icha.configuration.cases import adhesive_contacts, surface_settings
+from icha.planning.requirements import surface_memory, surface_threads
+
+
+rule configuration:
+    input:
+        as_it_is(list(COPIED.values())),
+    output:
+        FILES.configuration,
+        list(COPIED),
+    log:
+        "<logs>/configuration.log",
+    benchmark:
+        "<benchmarks>/configuration.jsonl"
+    conda:
+        "../envs/icha.yaml"
+    resources:
+        mem_mb=200,
+        runtime=2,
+    params:
+        # A dry run prints a checksum, not the text.
+        text=as_it_is(LongList([CONFIG_TEXT])),
+        # Copied files are compared by content, not by time.
+        sha256=lambda wildcards: [sha256_of(Path(file)) for file in COPIED.values()],
+        code=code_of("write_configuration.py"),
+    message:
+        "Writing the configuration as used"
+    script:
+        "../scripts/write_configuration.py"
+
+
+def surface_arguments(path):
+    """Return the arguments of the task that makes a surface."""
+    name, seed = FILES.surfaces[path]
+    section, topography = CAMPAIGN.surfaces[name], CAMPAIGN.topography(name)
+    return {
+        "name": name,
+        "seed": seed,
+        "settings": surface_settings(CAMPAIGN, name),
+        "height_map": section.path if section.from_file else None,
+        "sha256": getattr(topography, "sha256", None),
+        "attributes": ATTRIBUTES | STAMPS[path],
+    }
+
+
+# One rule for each batch. `update` and `ancient`: a batch keeps the files that have their stamps already, and the stamp
+# of a file contains the checksums of its inputs.
+for batch in surface_batches(CAMPAIGN, FILES.surfaces):
+    names = dict.fromkeys(FILES.surfaces[path][0] for path in batch.files)
+
+    rule:
+        name:
+            rule_name("make", batch)
+        input:
+            ancient([CAMPAIGN.surfaces[name].path for name in names if CAMPAIGN.surfaces[name].from_file]),
+        output:
+            [update(path) for path in batch.files],
+        log:
+            f"<logs>/surfaces/{batch.name}.log",
+        benchmark:
+            f"<benchmarks>/surfaces/{batch.name}.jsonl"
+        conda:
+            "../envs/icha.yaml"
+        threads: max(surface_threads(CAMPAIGN, name) for name in names)
+        resources:
+            mem_mb=max(surface_memory(CAMPAIGN, name) for name in names),
+            runtime=30,
+        params:
+            files=as_it_is(LongList(map(surface_arguments, batch.files))),
+            count=len(batch.files),
+        message:
+            "Surfaces, {params.count} realisations"
+        script:
+            "../scripts/make_surfaces.py"
+
+
+FIRST_SURFACES = dict(reversed([(name, path) for path, (name, _) in FILES.surfaces.items()]))
+
+
+def theory_arguments(path):
+    """Return the arguments of the task that computes the theories of a surface."""
+    name = FILES.theories[path]
+    return {
+        "surface": FIRST_SURFACES[name],
+        "settings": surface_settings(CAMPAIGN, name),
+        "adhesive": adhesive_contacts(CAMPAIGN, name),
+        "attributes": ATTRIBUTES | STAMPS[path],
+    }
+
+
+for batch in theory_batches(FILES.theories):
+
+    rule:
+        name:
+            rule_name("compute", batch)
+        input:
+            ancient([FIRST_SURFACES[FILES.theories[path]] for path in batch.files]),
+        output:
+            [update(path) for path in batch.files],
+        log:
+            f"<logs>/references/{batch.name}.log",
+        benchmark:
+            f"<benchmarks>/references/{batch.name}.jsonl"
+        conda:
+            "../envs/icha.yaml"
+        resources:
+            mem_mb=600,
+            runtime=10,
+        params:
+            files=as_it_is(LongList(map(theory_arguments, batch.files))),
+            count=len(batch.files),
+        message:
+            "Theories and literature for {params.count} surfaces"
+        script:
+            "../scripts/make_references.py"

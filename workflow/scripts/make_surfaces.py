@@ -1,0 +1,9 @@
+"""Make the topographies of a batch: generate random surfaces, read measured ones, or make smooth shapes."""
+
+from job import compute_batch, job_context
+
+from icha.tasks.surface import make_surface
+
+if "snakemake" in globals():
+    with job_context(snakemake):
+        compute_batch(snakemake.output, snakemake.params.files, make_surface)
