@@ -34,7 +34,7 @@ rule analyse:
         compared=as_it_is(LongList(FILES.compared)),
         varied=as_it_is(varied_values(CAMPAIGN)),
         samples=as_it_is(sampled_parameters(CAMPAIGN)),
-        count=len(FILES.runs),
+        number=len(FILES.runs),
         attributes=as_it_is(ATTRIBUTES),
         described=as_it_is(
             discovery_attributes(PUBLICATION)
@@ -46,7 +46,7 @@ rule analyse:
         ),
         code=code_of("analyse.py"),
     message:
-        "Campaign dataset of {params.count} runs, comparisons and checks"
+        "Campaign dataset of {params.number} runs, comparisons and checks"
     script:
         "../scripts/analyse.py"
 
@@ -70,6 +70,7 @@ rule verdict:
         runtime=30,
     params:
         results=as_it_is(RESULTS),
+        files=as_it_is(LongList(FILES.verified)),
         known=as_it_is({failure.run: failure.reason for failure in PUBLICATION.known_failures}),
         code=code_of("judge_results.py"),
     message:

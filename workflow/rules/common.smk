@@ -9,7 +9,7 @@ sys.path.insert(0, str(Path(ROOT, "workflow")))
 import prepare
 
 from icha.configuration.load import collect_inputs
-from icha.planning.batches import is_resumable, run_batches, surface_batches, theory_batches
+from icha.planning.batches import run_batches, surface_batches, theory_batches
 from icha.planning.results import campaign_files, expected_stamps
 from icha.support.checksums import LongList, sha256_of
 from icha.support.fingerprint import fingerprint
@@ -40,6 +40,15 @@ pathvars:
 def rule_name(kind, batch):
     """Return the name of the rule of a batch."""
     return f"{kind}_{batch.name}".replace("-", "_")
+
+
+def surfaces_for(runs):
+    """Return the surfaces of runs or theories that do not exist yet, from the path of the surface by path of the result.
+
+    A batch keeps files that exist, so it does not depend on their surfaces. Otherwise, a batch of surfaces that gets a
+    new seed would start all jobs that use its other seeds.
+    """
+    return list(dict.fromkeys(surface for path, surface in runs.items() if not Path(path).exists()))
 
 
 def as_it_is(value):

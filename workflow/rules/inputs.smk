@@ -45,8 +45,8 @@ def surface_arguments(path):
     }
 
 
-# One rule for each batch. `update` and `ancient`: a batch keeps the files that have their stamps already, and the stamp
-# of a file contains the checksums of its inputs.
+# One rule for each batch. With `update`, a batch keeps the files that exist with the expected stamps. Files of the user
+# are compared by content, not by time, because the stamp contains their checksums.
 for batch in surface_batches(CAMPAIGN, FILES.surfaces):
     names = dict.fromkeys(FILES.surfaces[path][0] for path in batch.files)
 
@@ -69,9 +69,9 @@ for batch in surface_batches(CAMPAIGN, FILES.surfaces):
             runtime=30,
         params:
             files=as_it_is(LongList(map(surface_arguments, batch.files))),
-            count=len(batch.files),
+            number=len(batch.files),
         message:
-            "Surfaces, {params.count} realisations"
+            "Surfaces, {params.number} realisations"
         script:
             "../scripts/make_surfaces.py"
 
@@ -96,7 +96,7 @@ for batch in theory_batches(FILES.theories):
         name:
             rule_name("compute", batch)
         input:
-            ancient([FIRST_SURFACES[FILES.theories[path]] for path in batch.files]),
+            surfaces_for({path: FIRST_SURFACES[FILES.theories[path]] for path in batch.files}),
         output:
             [update(path) for path in batch.files],
         log:
@@ -110,8 +110,8 @@ for batch in theory_batches(FILES.theories):
             runtime=10,
         params:
             files=as_it_is(LongList(map(theory_arguments, batch.files))),
-            count=len(batch.files),
+            number=len(batch.files),
         message:
-            "Theories and literature for {params.count} surfaces"
+            "Theories and literature for {params.number} surfaces"
         script:
             "../scripts/make_references.py"

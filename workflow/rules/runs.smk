@@ -2,7 +2,7 @@
 
 from icha.configuration.cases import run_settings
 from icha.datasets.results import SURFACE
-from icha.planning.requirements import run_memory, run_minutes
+from icha.planning.requirements import is_resumable, run_memory, run_minutes, run_threads
 
 
 def surface_of(case):
@@ -27,7 +27,7 @@ for batch in run_batches(CAMPAIGN, FILES.runs):
         name:
             rule_name("run", batch)
         input:
-            ancient(list(dict.fromkeys(map(surface_of, cases)))),
+            surfaces_for({path: surface_of(FILES.runs[path]) for path in batch.files}),
         output:
             [update(path) for path in batch.files],
         log:
@@ -38,15 +38,15 @@ for batch in run_batches(CAMPAIGN, FILES.runs):
         priority: int(batch.seconds)
         conda:
             "../envs/icha.yaml"
-        threads: max(surface_threads(CAMPAIGN, case.surface) for case in cases)
+        threads: max(run_threads(CAMPAIGN, case) for case in cases)
         resources:
             mem_mb=max(run_memory(CAMPAIGN, case) for case in cases),
             runtime=max(run_minutes(CAMPAIGN, case) for case in cases),
         params:
             files=as_it_is(LongList(map(run_arguments, batch.files))),
             label=batch.name,
-            count=len(batch.files),
+            number=len(batch.files),
         message:
-            "Runs {params.label}, {params.count} runs"
+            "Runs {params.label}, {params.number} runs"
         script:
             "../scripts/run_batch.py"

@@ -33,7 +33,9 @@ def analyse(runs, outputs, *, stamps, compared, varied, samples, attributes, des
     refuse_outdated(dict(zip(runs, stamps, strict=True)))
 
     def described_as(name):
-        return {"id": f"{attributes['campaign']}/{Path(outputs[name]).parent.name}/{Path(outputs[name]).stem}"} | attributes
+        return {
+            "id": f"{attributes['campaign']}/{Path(outputs[name]).parent.name}/{Path(outputs[name]).stem}"
+        } | attributes
 
     pairs = [(labels, path) for path, labels in runs.items()]
     write_campaign(

@@ -2,9 +2,10 @@
 
 import shutil
 
-from job import job_context, refuse_changed
+from job import job_context
 
 from icha.support.atomic_files import whole_file
+from icha.support.checksums import refuse_changed
 
 
 def write_configuration(output, *, text, copies, sha256):
@@ -25,7 +26,7 @@ if "snakemake" in globals():
         output, *copies = snakemake.output
         write_configuration(
             output,
-            text=snakemake.params.text,
+            text="".join(snakemake.params.text),
             copies=dict(zip(copies, snakemake.input, strict=True)),
             sha256=snakemake.params.sha256,
         )
