@@ -15,7 +15,7 @@ export UV_COMPILE_BYTECODE := 1
 unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
 
 .DEFAULT_GOAL := help
-.PHONY: help publish environment tamaas slurm-environment run validation hysteresis test test-all random-cases audit wheel lint format schema docs linkcheck benchmarks short-range indenter error-sources applicability faults validators-environment validate clean
+.PHONY: help publish environment tamaas slurm-environment run validation hysteresis test test-all random-cases audit wheel lint format schema docs linkcheck benchmarks short-range indenter error-sources applicability validators-environment validate clean
 
 help:
 	@echo "make run            run the campaign of config/config.yaml, or of CONFIG=FILE, on $(CORES) cores"
@@ -38,7 +38,6 @@ help:
 	@echo "make indenter       compare indenters with closed forms and ContactMechanics (half an hour); see docs/indenter.md"
 	@echo "make error-sources  compute variants between both models (half an hour); see docs/error_sources.md"
 	@echo "make applicability  compare asperities with boundary elements on sixty surfaces (ten minutes); see docs/limits.md"
-	@echo "make faults         kill jobs, damage files, fill disks (one to two hours, as root); see docs/faults.md"
 	@echo "make slurm-environment  install Snakemake and its Slurm executor in .venv-slurm; see docs/howto/cluster.md"
 	@echo "make validate DEPOSIT=FOLDER_OR_ZIP  check a deposit with programs of other projects, without network"
 	@echo "make clean          remove results, the records of Snakemake and the built documentation, not the environment"
@@ -64,9 +63,8 @@ environment: .venv/.installed
 tamaas: .venv/.tamaas
 
 # In a separate environment, because the Slurm executor makes every start of Snakemake slower.
-.venv-slurm/.installed: .venv-tools/bin/uv pyproject.toml uv.lock profiles/slurm/executor/pyproject.toml
+.venv-slurm/.installed: .venv-tools/bin/uv pyproject.toml uv.lock
 	UV_PROJECT_ENVIRONMENT=$(CURDIR)/.venv-slurm .venv-tools/bin/uv sync --quiet --locked --no-default-groups --extra slurm --python $(PYTHON)
-	.venv-tools/bin/uv pip install --quiet --no-deps --python .venv-slurm/bin/python --editable profiles/slurm/executor
 	@touch $@
 
 slurm-environment: .venv-slurm/.installed
@@ -150,9 +148,6 @@ linkcheck: environment
 benchmarks: environment .venv-benchmarks/.installed
 	python benchmarks/run.py $(OPTIONS)
 	python -m benchmarks.tables
-
-faults: environment
-	python -m validation.faults $(OPTIONS)
 
 # The validators are in a separate environment, because some of them need an old version of jsonschema.
 .venv-validators/.installed: .venv-tools/bin/uv tests/validators/requirements.txt

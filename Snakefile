@@ -11,13 +11,13 @@ LOCAL_FOLDERS = {os.path.realpath(ROOT), os.path.realpath("")}
 REQUESTED = os.environ.get("PYTHONPATH", "").split(os.pathsep)
 sys.path.sort(key=lambda folder: os.path.realpath(folder) in LOCAL_FOLDERS and folder not in filter(None, REQUESTED))
 
-# The same for jobs. Snakemake inserts the path of Python into shell commands without quotes.
-os.environ["PYTHONSAFEPATH"] = "1"
-sys.executable = shlex.quote(sys.executable)
-
 from snakemake.utils import min_version
 
 min_version("9.17")
+
+# Modules of jobs cannot be replaced either. Snakemake inserts the path of Python into shell commands without quotes.
+os.environ["PYTHONSAFEPATH"] = "1"
+sys.executable = shlex.quote(sys.executable)
 
 
 include: "workflow/rules/common.smk"

@@ -111,11 +111,7 @@ def _call(project, arguments, environment, output):
     icha.__path__[:] = icha.__spec__.submodule_search_locations[:] = [str(project / "icha")]
     for file in (REPOSITORY / "workflow").glob("*.py"):
         sys.modules.pop(file.stem, None)
-    try:
-        main(arguments[1:])
-    finally:
-        if "fingerprint" in sys.modules:
-            sys.modules["fingerprint"].save_cache()  # a fork runs no `atexit` handlers
+    main(arguments[1:])
 
 
 def smaller_smoke():
@@ -178,15 +174,6 @@ def is_alive(process):
         return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
         return False
-
-
-@pytest.fixture
-def before_jobs(monkeypatch):
-    """The module `workflow/before_jobs.py`."""
-    monkeypatch.syspath_prepend(str(REPOSITORY / "workflow"))
-    import before_jobs
-
-    return before_jobs
 
 
 @pytest.fixture

@@ -10,17 +10,23 @@ from icha.support.formatting import format_count, printable
 
 
 def check(
-    files: Annotated[list[Path], typer.Argument(help="Runs, surfaces, campaign datasets or other results.")],
+    files: Annotated[
+        list[Path], typer.Argument(help="Runs, surfaces, campaign datasets or other results, or folders results/NAME.")
+    ],
 ) -> None:
     """Check the variables, units and attributes of files, and whether results satisfy physical identities.
 
-    For example, the areas of all spots must add up to the contact area. The command prints all problems of all files.
+    For example, the areas of all spots must add up to the contact area. For a folder of results, the command compares
+    all files with their checksums, which shows damage of the disk. The command prints all problems of all files.
     Exit status: 0 if no file has problems, 1 if a file has problems, 2 if ICHA cannot read a file.
     """
     from icha.datasets.format import CAMPAIGN, RUN, SURFACE, UnknownFile, identify_file
 
     status = 0
     for file in files:
+        if file.is_dir():
+            status = max(status, _check_folder(file))
+            continue
         try:
             kind, data = identify_file(file)
         except UnknownFile as error:
@@ -43,6 +49,22 @@ def check(
             echo(f"{file}: {kind}, no problems" + (f" ({format_count(count, 'check')} passed)" if count else ""))
     if status:
         raise typer.Exit(status)
+
+
+def _check_folder(folder: Path) -> int:
+    """Compare the files of a folder of results with their checksums; return the exit status."""
+    from icha.support.checksums import CHECKSUMS, changed_files
+
+    try:
+        changed = changed_files(folder)
+    except FileNotFoundError:
+        echo(f"Error: {folder}: has no {CHECKSUMS}; expected the folder of a finished campaign", err=True, fg="red")
+        return WRONG
+    for path in changed:
+        echo(f"{folder / path}: is missing, or differs from its checksum in {CHECKSUMS}", fg="red")
+    if not changed:
+        echo(f"{folder}: all files have their checksums")
+    return FAILED if changed else 0
 
 
 def _problems(kind, data) -> tuple[list[str], int]:

@@ -27,10 +27,10 @@ def explore(
     the page with all contacts would exceed the largest size, contacts are omitted, and the command prints how many.
     """
     from icha.datasets.results import EXPLORER
-    from icha.deposit.verify import CHECKSUMS
+    from icha.deposit.verify import CRATE
     from icha.report.explorer import write_explorer
 
-    if output is None and (results / CHECKSUMS).is_file():
+    if output is None and (results / CRATE).is_file():
         raise UserError(f"{results} is a deposit, which must not change; choose another file with --output")
     page = output or results / EXPLORER
     choices = {"study": study, "surface": surface, "material": material, "seed": seed}

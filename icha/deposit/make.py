@@ -8,15 +8,16 @@ import json
 import os
 import shutil
 import zipfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import xarray as xr
 
 from icha.analysis.checks import read_checks, refuse_unknown_failures
 from icha.configuration.campaign import Campaign
-from icha.configuration.cases import campaign_sha256, run_sha256
+from icha.configuration.cases import campaign_sha256
 from icha.datasets.files import read_campaign
+from icha.datasets.stamp import read_stamp, refuse_outdated
 from icha.deposit.crate import Job, write_crate
 from icha.deposit.dictionary import data_dictionary
 from icha.deposit.metadata import citation_cff, datacite_metadata, find_licence, zenodo_metadata
@@ -24,10 +25,9 @@ from icha.deposit.program import Source
 from icha.deposit.readme import readme
 from icha.deposit.verify import CHECKSUMS, CRATE, README, SOURCE, ZENODO, files_of, problem_with_name
 from icha.planning.costs import Cost
-from icha.planning.plan import DONE, FAILED, run_state
-from icha.planning.results import campaign_files
-from icha.support.atomic_files import moving, sync_folder, whole_file
-from icha.support.checksums import is_whole, recorded_hash, sha256_of, stale
+from icha.planning.results import campaign_files, expected_stamps
+from icha.support.atomic_files import sync_folder, whole_file
+from icha.support.checksums import changed_files, sha256_of
 
 _BLOCK = 2**20
 # All files in the zip have the earliest time that the format allows, so that the same files give the same zip.
@@ -62,13 +62,11 @@ def make_deposit(
     Raises
     ------
     ValueError
-        If a file has changed since a job wrote it, if some systems refuse the name of a file, or if the failed checks
-        are not exactly the known failures.
+        If some systems refuse the name of a file, or if the failed checks are not exactly the known failures.
     """
     folder, archive, results = Path(folder), Path(archive), Path(results)
     files, publication = sorted(files), campaign.deposit_metadata()
     refuse_unknown_failures(read_checks(results / "checks.json"), [each.run for each in publication.known_failures])
-    _refuse_changed(results, files)
     staging = folder.with_name(f".{folder.name}.part")
     shutil.rmtree(staging, ignore_errors=True)
     try:
@@ -88,49 +86,35 @@ def make_deposit(
         with whole_file(archive) as temporary:
             _write_zip(temporary, staging, folder.name)
             sync_folder(staging)
-            with moving():
-                archive.unlink(missing_ok=True)
-                shutil.rmtree(folder, ignore_errors=True)
-                staging.rename(folder)
+            archive.unlink(missing_ok=True)
+            shutil.rmtree(folder, ignore_errors=True)
+            staging.rename(folder)
     finally:
         shutil.rmtree(staging, ignore_errors=True)
 
 
-def refuse_mixed(results: Path, campaign: Campaign, recorded: Mapping[str, str]) -> None:
-    """Raise ValueError if settings or input files have changed since the results were computed.
+def refuse_mixed(results: Path, campaign: Campaign) -> None:
+    """Raise ValueError if results do not belong to the campaign, or files have changed since their jobs wrote them.
 
     Parameters
     ----------
     results : folder of results of the campaign.
     campaign : configuration of the campaign.
-    recorded : for each path in `results`, the checksum of the job's parameters
-        (`icha.support.checksums.hash_parameters`). The workflow has recorded these checksums.
 
     Raises
     ------
     ValueError
-        If a result has other settings or inputs. The message lists these results with the reasons.
+        If the stamp of a surface, a run, theories or the campaign dataset is not the expected one, or if a file differs
+        from the list of checksums. The message lists these files.
     """
-    files = campaign_files(campaign)
-    expected = {path: run_sha256(campaign, case) for path, case in files.runs.items()}
-    expected[files.dataset] = campaign_sha256(campaign)
-    wrong = dict(stale(results, recorded))
-    for path, sha256 in expected.items():
-        if run_state(results / path, sha256)[0] not in (DONE, FAILED):
-            wrong[path] = "was not computed with the settings of the campaign"
-    for path, asked in recorded.items():
-        if asked != recorded_hash(results, path):
-            wrong.setdefault(path, "was made by another job than the workflow has recorded")
-    if wrong:
+    refuse_outdated(expected_stamps(campaign, str(results)))
+    dataset = results / campaign_files(campaign).dataset
+    if (read_stamp(dataset) or {}).get("config_sha256") != campaign_sha256(campaign):
         raise ValueError(
-            "not published, because these results do not belong together. Remove these files and repeat the command:\n"
-            + "\n".join(f"  {results / path}: {why}" for path, why in sorted(wrong.items()))
+            f"not published, because {dataset} was not computed with the settings of the campaign. Remove this file, "
+            "and run the campaign again"
         )
-
-
-def _refuse_changed(results, files):
-    """Raise `ValueError` for files that have changed since their jobs wrote them."""
-    if changed := [f"  {results / file}" for file in files if not is_whole(results, file, thorough=True)]:
+    if changed := [f"  {results / file}" for file in changed_files(results)]:
         listed = "\n".join(changed)
         raise ValueError(
             "not published, because these files have changed since their jobs wrote them. Remove these files, and run "

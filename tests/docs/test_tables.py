@@ -5,7 +5,7 @@ import re
 import pytest
 
 from benchmarks import tables as benchmarks
-from validation import faults, indenter, loop_grid, short_range
+from validation import indenter, loop_grid, short_range
 from validation.tables import DOCS
 
 
@@ -21,10 +21,9 @@ def test_every_table_is_included_by_one_page():
         lambda: benchmarks.tables(benchmarks.read_results()),
         lambda: short_range.tables(short_range.read_measurements()),
         lambda: indenter.tables(indenter.read_measurements()),
-        lambda: faults.tables(faults.read_counts()),
         lambda: loop_grid.tables(loop_grid.read_measurements()),
     ],
-    ids=["benchmarks", "short_range", "indenter", "faults", "loop_grid"],
+    ids=["benchmarks", "short_range", "indenter", "loop_grid"],
 )
 def test_tables_agree_with_the_saved_measurements(tables):
     for name, table in tables().items():

@@ -5,6 +5,7 @@ are children of this process and end with the `with` block; all their files are 
 already has a Slurm, none is started: `why_not` returns the reason.
 """
 
+import ctypes
 import fcntl
 import os
 import secrets
@@ -16,10 +17,7 @@ import tempfile
 import time
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-
-from icha.support.program import end_with_parent
 
 PROGRAMS = ("munged", "slurmctld", "slurmd", "sbatch", "srun", "squeue", "sinfo", "scancel")
 PACKAGES = "slurmctld slurmd slurm-client munge"
@@ -147,7 +145,7 @@ def single_node(cores: int = 4, memory: int = 8000):
                 stdout=output,
                 stderr=output,
                 start_new_session=True,
-                preexec_fn=partial(end_with_parent, os.getpid()),
+                preexec_fn=_end_with_parent,
             )
             stack.callback(_end, daemon)
             if name == "munged":
@@ -160,6 +158,12 @@ def single_node(cores: int = 4, memory: int = 8000):
 def _ours(path: Path) -> bool:
     """Return whether a configuration belongs to a Slurm of this module, perhaps of a killed test."""
     return path.is_symlink() and os.readlink(path).startswith(str(Path(tempfile.gettempdir(), FOLDER)))
+
+
+def _end_with_parent() -> None:
+    """Let the operating system kill this process when the process that started it ends for any reason."""
+    death_signal = 1  # PR_SET_PDEATHSIG of prctl(2)
+    ctypes.CDLL(None).prctl(death_signal, signal.SIGKILL)
 
 
 def _free_ports(number: int) -> list[int]:

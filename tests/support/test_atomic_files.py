@@ -1,10 +1,12 @@
-"""Temporary files of killed programs are recognised by their names; an owner writes from any folder."""
+"""A file is complete on the disk or does not exist."""
 
+import os
+import sys
 from pathlib import Path
 
 import pytest
 
-from icha.support.atomic_files import is_left_over, probe_folder, take_over, whole_file
+from icha.support.atomic_files import is_left_over, probe_folder, whole_file
 
 
 def test_files_of_a_killed_program_are_recognised_by_their_names(tmp_path, monkeypatch):
@@ -19,12 +21,18 @@ def test_files_of_a_killed_program_are_recognised_by_their_names(tmp_path, monke
     assert not is_left_over("a.txt") and not is_left_over(".snakemake_timestamp")
 
 
-def test_an_owner_writes_other_files_from_wherever_it_is(tmp_path, monkeypatch):
-    """The program may end in another folder than that of the campaign."""
-    monkeypatch.setenv("ICHA_OWNER", "")
-    monkeypatch.chdir(tmp_path)
-    take_over(".snakemake/tiny.owner")
-    monkeypatch.chdir("/")
-    with whole_file(tmp_path / "kept.json") as temporary:
-        temporary.write_text("{}")
-    assert (tmp_path / "kept.json").read_text() == "{}"
+@pytest.mark.skipif(sys.platform != "linux", reason="needs /proc")
+def test_content_and_name_of_a_file_reach_the_disk_in_this_order(tmp_path, monkeypatch):
+    done = []
+    sync, replace = os.fsync, os.replace
+
+    def synchronise(file):
+        path = Path(os.readlink(f"/proc/self/fd/{file}"))
+        done.append("folder" if path.is_dir() else "content")
+        sync(file)
+
+    monkeypatch.setattr(os, "fsync", synchronise)
+    monkeypatch.setattr(os, "replace", lambda old, new: done.append("name") or replace(old, new))
+    with whole_file(tmp_path / "a.nc") as temporary:
+        temporary.write_text("a result")
+    assert done == ["content", "name", "folder"]

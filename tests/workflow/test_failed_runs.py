@@ -17,8 +17,11 @@ from icha.figures.fig2_area_and_gap import figure
 from icha.figures.registry import draw_figure
 from icha.figures.select import NothingToDraw
 from icha.surfaces.surface import Surface
+from icha.tasks.run import compute_run
+from icha.tasks.theories import make_theories
 
-ATTRIBUTES = {"campaign": "small", "study": "sticky", "config_sha256": "0", "license": "CC0-1.0"}
+STAMP = {"id": "small/runs/a", "config_sha256": "0", "program_sha256": "1", "license": "CC0-1.0"}
+ATTRIBUTES = {"campaign": "small", "study": "sticky"} | STAMP
 PATH = {"reduced_pressures": [1e-3], "snapshots": [("reduced_pressure", 1e-3)]}
 BOTH_WAYS = PATH | {"unload": True, "max_step": 0.5}
 # The surface energy is ten times the energy that presses the summits flat.
@@ -46,14 +49,13 @@ def pitted():
 
 @pytest.fixture
 def sweep(tmp_path):
-    """Return a function that computes a run with the script of the job; it returns the file and the progress lines."""
-    from run_sweep import run_sweep
+    """Return a function that computes a run as a batch does; it returns the file and the progress lines."""
 
     def run(name, material, path=PATH, surface=None, model="asperities"):
         said, topography, output = [], tmp_path / f"{name}-surface.nc", tmp_path / f"{name}.nc"
         write_surface(topography, small.surface() if surface is None else surface, name="rough", seed=1)
         settings = {"material": material, "path": path, "attributes": ATTRIBUTES, "model": model}
-        run_sweep(topography, output, rms_slope=1.0, seed=1, progress=said.append, **settings)
+        compute_run(topography, output, rms_slope=1.0, seed=1, progress=said.append, **settings)
         return output, said
 
     return run
@@ -61,14 +63,23 @@ def sweep(tmp_path):
 
 @pytest.fixture
 def dataset(tmp_path):
-    """Return a function that makes a campaign dataset of run files, by material or by surface/material."""
-    from make_dataset import make_dataset
+    """Return a function that analyses run files, by material or by surface/material; checks are in `checks.json`."""
+    from analyse import analyse
 
     def make(files, model="asperities"):
         names = [name.rpartition("/") for name in files]
-        labels = [tuple(RunLabels("sticky", model, surface or "rough", 1, 1.0, name)) for surface, _, name in names]
-        attributes, settings = {"title": "Sticky", "config_sha256": "1"}, ["0"] * len(labels)
-        make_dataset(files.values(), tmp_path / "c.nc", labels=labels, settings=settings, attributes=attributes)
+        labels = [RunLabels("sticky", model, surface or "rough", 1, 1.0, name) for surface, _, name in names]
+        outputs = {"dataset": "c.nc", "table": "c.csv", "comparison": "comparison.nc", "checks": "checks.json"}
+        analyse(
+            dict(zip(map(str, files.values()), labels, strict=True)),
+            {name: tmp_path / file for name, file in outputs.items()},
+            stamps=[STAMP] * len(labels),
+            compared=[],
+            varied={},
+            samples={},
+            attributes={"campaign": "small"},
+            described={"title": "Sticky", "config_sha256": "1"},
+        )
         return tmp_path / "c.nc", labels
 
     return make
@@ -85,7 +96,6 @@ def test_the_file_of_a_run_without_stops_states_the_reason(sweep):
 
 
 def test_the_verdict_lists_the_failed_run_and_the_others_are_used(sweep, dataset, tmp_path):
-    from check_results import check_results
     from judge_results import judge_results
 
     # The failed run comes first; the variables of the study are those of the other run.
@@ -107,7 +117,6 @@ def test_the_verdict_lists_the_failed_run_and_the_others_are_used(sweep, dataset
     assert glue.sizes["snapshot"] == glue.sizes["spot"] == 0
     np.testing.assert_array_equal(glue["nominal_pressure"].values, broken["nominal_pressure"].values)
 
-    check_results(file, tmp_path / "checks.json", labels=labels)
     failed = [check for check in read_checks(tmp_path / "checks.json") if not check.passed]
     assert [(check.subject, check.description) for check in failed] == [("sticky/rough/seed1/slope1/glue", reason)]
     with pytest.raises(ValueError) as verdict:
@@ -215,13 +224,11 @@ def test_the_file_of_an_incomplete_unloading_keeps_the_reason(tmp_path):
 
 
 def test_theories_that_do_not_apply_to_a_surface_are_omitted(tmp_path, capsys):
-    from make_references import make_references
-
     # The moments of a single cap on a free square are impossible for an isotropic Gaussian surface.
     x = np.linspace(-1, 1, 32)
     cap = Surface(-1e-6 * (x[:, None] ** 2 + x**2), 100e-6, "free").scaled_to_rms_slope(1.0)
     write_surface(tmp_path / "cap.nc", cap, name="cap", seed=1)
-    make_references(
+    make_theories(
         tmp_path / "cap.nc", tmp_path / "theories.nc", settings={"kind": "measured"}, adhesive=[], attributes={}
     )
     found = read_dataset(tmp_path / "theories.nc")

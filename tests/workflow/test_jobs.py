@@ -1,218 +1,163 @@
-"""Every job records its results, checks its inputs, writes a log, and ends with Snakemake."""
+"""Jobs: log and errors, batches, files of users; the folder of results before jobs start."""
 
-import json
 import os
-import signal
 import subprocess
 import sys
-from base64 import urlsafe_b64encode
-from multiprocessing import spawn
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY, is_alive, wait_for
+import xarray as xr
+from conftest import REPOSITORY
 
+from icha.datasets.files import write_dataset
+from icha.datasets.stamp import NAMES
 from icha.datasets.surface_file import read_surface
-from icha.support.atomic_files import take_over, whole_file
-from icha.support.checksums import (
-    hash_parameters,
-    is_whole,
-    recorded_hash,
-    sha256_of,
-    with_sidecar,
-    write_checksum,
-)
-from icha.support.program import beginning_of
+from icha.support.checksums import sha256_of
 from icha.surfaces.shapes import make_shape
+from icha.tasks.surface import make_surface
 
-RESULTS = "results/tiny"
 SCRIPT = f"""
 import sys
 from types import SimpleNamespace
 sys.path.insert(0, {str(REPOSITORY / "workflow/scripts")!r})
 from job import job_context
-snakemake = SimpleNamespace(
-    input=["{RESULTS}/surfaces/a.nc", "elsewhere.txt"], output=["{RESULTS}/runs/b.nc"], log=[sys.argv[1]],
-    params=[{{"seed": 1}}, "code"],
-)
-with job_context(snakemake):
+with job_context(SimpleNamespace(log=[sys.argv[1]])):
     print("at work", flush=True)
 """
-WORK = f"    open('{RESULTS}/runs/b.nc', 'w').write('a result')\n"
 
 
-@pytest.fixture
-def job(tmp_path):
-    """Start a job with one input in a folder of results."""
-    for folder in ("surfaces", "runs", "logs"):
-        (tmp_path / RESULTS / folder).mkdir(parents=True)
-    (tmp_path / RESULTS / "surfaces/a.nc").write_bytes(b"heights")
-    write_checksum(tmp_path / RESULTS, "surfaces/a.nc")
-
-    def start(work, log="logs/b.log", before="", **environment):
-        return subprocess.Popen(
-            [sys.executable, "-c", before + SCRIPT + work, f"{RESULTS}/{log}"],
-            cwd=tmp_path,
-            env=os.environ | {"PYTHONPATH": str(REPOSITORY)} | environment,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-
-    start.results = tmp_path / RESULTS
-    return start
+def run_job(work, log):
+    """Run a job; return its status and its error output."""
+    done = subprocess.run([sys.executable, "-c", f"{SCRIPT}    {work}\n", str(log)], capture_output=True, text=True)
+    return done.returncode, done.stderr
 
 
-def ended(process):
-    """Return the status and the error output of a job."""
-    output = process.communicate(timeout=60)[1]
-    return process.returncode, output
-
-
-def test_a_job_records_its_result_and_its_settings_even_if_it_changes_them(job):
-    assert ended(job(f"{WORK}    snakemake.params[0].clear()\n")) == (0, "")
-    assert json.loads((job.results / "checksums/runs/b.nc.json").read_text())["size"] == len("a result")
-    assert (job.results / "logs/b.log").read_text() == "at work\n"
-    assert recorded_hash(job.results, "runs/b.nc") == hash_parameters([repr({"seed": 1}), repr("code")])
-
-
-def test_the_result_of_a_failed_job_is_computed_again(job):
-    (job.results / "runs/b.nc").write_text("a former result")
-    write_checksum(job.results, "runs/b.nc")
-    (job.results / "runs/b.nc").unlink()
-    assert ended(job("    raise ValueError('wrong input')\n"))[0] == 1
-    assert (job.results / "logs/b.log").read_text() == "at work\nError: wrong input\n"
-    assert "runs/b.nc" in with_sidecar(job.results) and not (job.results / "runs/b.nc").exists()
-
-
-def test_a_job_refuses_a_damaged_input_and_records_the_damage(job):
-    file = job.results / "surfaces/a.nc"
-    before = file.stat()
-    file.write_bytes(b"hexghts")
-    os.utime(file, ns=(before.st_atime_ns, before.st_mtime_ns))
-    assert is_whole(job.results, "surfaces/a.nc")
-    assert ended(job(WORK))[0] == 1
-    log = (job.results / "logs/b.log").read_text()
-    assert log.startswith(f"Error: {RESULTS}/surfaces/a.nc: does not match its checksum") and "at work" not in log
-    assert not (job.results / "runs/b.nc").exists()
-    assert not is_whole(job.results, "surfaces/a.nc")
+@pytest.mark.parametrize(
+    ("work", "status", "printed", "has_traceback"),
+    [
+        ("print('done')", 0, "done", False),
+        ("raise ValueError('wrong input')", 1, "Error: wrong input", False),
+        ("raise KeyError('a')", 1, "Error: unexpected KeyError('a')", True),
+    ],
+)
+def test_output_and_errors_of_a_job_are_in_its_log(work, status, printed, has_traceback, tmp_path):
+    assert run_job(work, tmp_path / "job.log") == (status, "")
+    assert (tmp_path / "job.log").read_text().splitlines()[:2] == ["at work", printed]
+    assert (tmp_path / "job.log.traceback").exists() == has_traceback
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
-def test_errors_go_to_the_terminal_if_the_log_cannot_be_written(job):
-    (job.results / "logs/full.log").symlink_to("/dev/full")
-    status, output = ended(job(WORK, log="logs/full.log"))
+def test_errors_go_to_the_terminal_if_the_log_cannot_be_written(tmp_path):
+    (tmp_path / "full.log").symlink_to("/dev/full")
+    status, output = run_job("open('result', 'w')", tmp_path / "full.log")
     assert status == 1
     assert output.removeprefix("at work\n") == "Error: [Errno 28] No space left on device\n"
 
 
-def test_a_job_ends_when_its_snakemake_ends(job):
-    snakemake = subprocess.Popen(["sleep", "600"])
-    told = f"{snakemake.pid} {beginning_of(snakemake.pid)}"
-    process = job(f"    import time\n{WORK}    time.sleep(600)\n", ICHA_SNAKEMAKE=told)
-    wait_for((job.results / "runs/b.nc").exists)
-    assert process.poll() is None
-    snakemake.send_signal(signal.SIGKILL)
-    snakemake.wait()
-    assert ended(process) == (1, "")
+@pytest.fixture
+def batch(monkeypatch, tmp_path):
+    """Return a function that computes a batch of three files with given stamps; it returns the computed names."""
+    monkeypatch.syspath_prepend(str(REPOSITORY / "workflow/scripts"))
+    from job import compute_batch
+
+    def compute(*programs, failing=None):
+        computed = []
+
+        def task(output, attributes):
+            if output == failing:
+                raise OSError(28, "No space left on device")
+            computed.append(Path(output).stem)
+            write_dataset(DATASET.assign_attrs(attributes), output)
+
+        outputs = [str(tmp_path / f"{name}.nc") for name in "abc"]
+        stamps = [dict.fromkeys(NAMES, "same") | {"program_sha256": program} for program in programs]
+        arguments = [{"attributes": stamp} for stamp in stamps]
+        try:
+            compute_batch(outputs, arguments, task)
+        except OSError:
+            computed.append("failed")
+        return computed
+
+    return compute
 
 
-@pytest.mark.parametrize("reused", [False, True])
-def test_a_job_whose_snakemake_ended_before_writes_nothing(job, reused):
-    snakemake = subprocess.Popen(["true"])
-    told = f"{snakemake.pid} {beginning_of(snakemake.pid)}"
-    snakemake.wait()
-    if reused:
-        told = f"{os.getpid()} 1"
-    assert ended(job(WORK, ICHA_SNAKEMAKE=told)) == (1, "")
-    assert not (job.results / "runs/b.nc").exists() and "runs/b.nc" not in with_sidecar(job.results)
+DATASET = xr.Dataset({"value": ((), 1.0, {"units": "1"})})
 
 
-def test_a_busy_job_is_killed_when_its_snakemake_is_killed(job, tmp_path):
-    busy = "    import re\n    re.match('(a?){60}b', 'a' * 60)  # blocks the interpreter for years\n"
-    (tmp_path / "busy.py").write_text(SCRIPT + WORK + busy)
-    caller = f"""
-import os, subprocess, sys
-sys.path.insert(0, {str(REPOSITORY)!r})
-from icha.support.program import beginning_of
-os.environ["ICHA_SNAKEMAKE"] = f"{{os.getpid()}} {{beginning_of(os.getpid())}}"
-process = subprocess.Popen([sys.executable, "busy.py", "{RESULTS}/logs/b.log"])
-print(process.pid, flush=True)
-process.wait()
-"""
-    snakemake = subprocess.Popen([sys.executable, "-c", caller], cwd=tmp_path, stdout=subprocess.PIPE, text=True)
-    busy = int(snakemake.stdout.readline())
-    wait_for((job.results / "runs/b.nc").exists)
-    snakemake.kill()
-    snakemake.wait()
-    wait_for(lambda: not is_alive(busy), seconds=30)  # far less than the work would take
+def test_a_batch_computes_only_files_without_the_expected_stamp(batch, tmp_path):
+    assert batch("1", "1", "1") == ["a", "b", "c"]
+    assert batch("1", "1", "1") == []
+    assert batch("1", "2", "1") == ["b"]
+    os.truncate(tmp_path / "c.nc", (tmp_path / "c.nc").stat().st_size // 2)
+    (tmp_path / "a.nc").unlink()
+    assert batch("1", "2", "1") == ["a", "c"]
 
 
-def test_a_job_of_an_earlier_call_cannot_complete_a_result_of_a_later_call(job, tmp_path, monkeypatch):
-    owner = tmp_path / ".snakemake/tiny.owner"
-    monkeypatch.setenv("ICHA_OWNER", "")
-    take_over(owner)
-    # The job of the earlier call writes 25 MPa. Before it completes the file, a later call writes 30 MPa.
-    write = f"""
-    from icha.support.atomic_files import whole_file
-    with whole_file('{RESULTS}/runs/b.nc') as temporary:
-        temporary.write_text('25 MPa')
-        print('half way', flush=True)
-        import pathlib, time
-        while not pathlib.Path('go on').exists():
-            time.sleep(0.02)
-"""
-    orphan = job(write)
-    wait_for(lambda: "half way" in (job.results / "logs/b.log").read_text(errors="replace"))
-    take_over(owner)
-    later = write.replace("25 MPa", "30 MPa").replace("while not", "while False and not")
-    assert ended(job(later, log="logs/later.log")) == (0, "")
-    (tmp_path / "go on").touch()
-    assert ended(orphan)[0] == 1
-    assert "a later call of this campaign owns this result" in (job.results / "logs/b.log").read_text()
-    assert (job.results / "runs/b.nc").read_text() == "30 MPa" and is_whole(job.results, "runs/b.nc", thorough=True)
-    assert [file.name for file in (job.results / "runs").iterdir()] == ["b.nc"]
+def test_the_files_before_an_error_of_the_machine_are_kept(batch, tmp_path):
+    assert batch("1", "1", "1", failing=str(tmp_path / "b.nc")) == ["a", "failed"]
+    assert batch("1", "1", "1") == ["b", "c"]
 
 
-def campaign(before_jobs, *, dry_run=False):
-    return before_jobs.CampaignResults(RESULTS, "tiny", "tiny.yaml", "clone", dry_run=dry_run)
-
-
-def test_only_a_call_that_starts_jobs_takes_over_the_results(job, tmp_path, monkeypatch, before_jobs):
+@pytest.fixture
+def prepare(monkeypatch, tmp_path):
+    """The module `workflow/prepare.py`, in an empty working directory."""
+    monkeypatch.syspath_prepend(str(REPOSITORY / "workflow"))
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(before_jobs, "hold_lock", lambda path: None)  # as on a file system without locks
-    monkeypatch.setenv("ICHA_OWNER", "")
-    take_over(".snakemake/tiny.owner")
-    earlier = os.environ["ICHA_OWNER"]
-    own = campaign(before_jobs)
-    assert ended(job(WORK, ICHA_OWNER=earlier)) == (0, "")
-    # A call that starts jobs takes over, unless the results have changed since they were inspected.
-    (job.results / "runs/b.nc").write_text("another result")
-    with pytest.raises(SystemExit, match=r"runs/b\.nc has changed while"):
-        own.begin()
-    (job.results / "runs/b.nc").unlink()
-    own.begin()
-    # A late job of the earlier call changes neither the result nor its record.
-    assert ended(job(WORK)) == (0, "")
-    record = (job.results / "checksums/runs/b.nc.json").read_bytes()
-    assert ended(job(WORK.replace("a result", "another result"), ICHA_OWNER=earlier))[0] == 1
-    assert (job.results / "checksums/runs/b.nc.json").read_bytes() == record
-    assert (job.results / "runs/b.nc").read_text() == "a result"
+    import prepare
+
+    yield prepare
+    while prepare.locks:
+        prepare.locks.pop().close()
+
+
+STAMPS = {"results/tiny/run.nc": dict.fromkeys(NAMES, "new")}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "dry_run", "removed"),
+    [
+        ([], False, True),
+        (["all", "--cores", "2", "--report-after-run"], False, True),
+        ([], True, False),
+        (["--touch"], False, False),
+        (["--report", "page.html"], False, False),
+        (["--report=page.html"], False, False),
+        (["--list-changes", "code"], False, False),
+        (["-S"], False, False),
+    ],
+)
+def test_outdated_files_are_removed_if_jobs_will_run(arguments, dry_run, removed, prepare, monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["snakemake", *arguments])
+    for path, stamp in STAMPS.items():
+        Path(path).parent.mkdir(parents=True)
+        write_dataset(DATASET.assign_attrs(stamp), path)
+        results = "results/tiny", "tiny", "tiny.yaml", "clone"
+        prepare.Results(*results, STAMPS, dry_run=dry_run)
+        assert Path(path).exists()
+        for lock in prepare.locks:
+            lock.close()
+        prepare.Results(*results, {path: stamp | {"config_sha256": "other"}}, dry_run=dry_run)
+        assert Path(path).exists() != removed
 
 
 @pytest.mark.parametrize("link", [True, False])
-def test_a_file_or_a_broken_link_instead_of_the_results_is_named(link, tmp_path, monkeypatch, before_jobs):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(before_jobs, "hold_lock", lambda path: None)
+def test_a_file_or_a_broken_link_instead_of_the_results_is_named(link, prepare):
     Path("results").symlink_to("nowhere") if link else Path("results").write_text("something else")
     with pytest.raises(SystemExit, match="results/tiny cannot be written to: instead of a folder there is"):
-        campaign(before_jobs)
+        prepare.Results("results/tiny", "tiny", "tiny.yaml", "clone", {}).begin()
+
+
+def test_a_folder_with_a_backslash_is_refused(prepare, tmp_path, monkeypatch):
+    (tmp_path / "a\\b").mkdir()
+    monkeypatch.chdir(tmp_path / "a\\b")
+    with pytest.raises(SystemExit, match="has a backslash"):
+        prepare.Results("results/tiny", "tiny", "tiny.yaml", "clone", {}).begin()
 
 
 def test_a_file_that_changed_after_its_inspection_is_neither_used_nor_copied(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(REPOSITORY / "workflow/scripts"))
-    from make_surface import make_surface
     from write_configuration import write_configuration
 
     file, surface, copy = (tmp_path / name for name in ("heights.npy", "surface.nc", "copy.npy"))
@@ -237,10 +182,7 @@ def test_a_file_that_changed_after_its_inspection_is_neither_used_nor_copied(tmp
     assert not surface.exists() and sha256_of(copy) == inspected
 
 
-def test_the_file_of_a_surface_keeps_the_shape_and_scales_the_roughness_alone(tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(str(REPOSITORY / "workflow/scripts"))
-    from make_surface import make_surface
-
+def test_the_file_of_a_surface_keeps_the_shape_and_scales_the_roughness_alone(tmp_path):
     rough = {"kind": "self_affine", "period": 4e-4, "rolloff_wavelength": 1e-4, "short_wavelength": 5e-5, "hurst": 0.8}
     rough |= {"grid": 64, "amplitudes": "fixed"}
     smooth = {"kind": "smooth", "side": 4e-4, "grid": 64}
@@ -257,19 +199,6 @@ def test_the_file_of_a_surface_keeps_the_shape_and_scales_the_roughness_alone(tm
             assert other.rms_slope == pytest.approx(slope / 50, rel=1e-12)
             np.testing.assert_allclose(other.profile - other.heights, surface.profile - surface.heights, atol=1e-18)
             file.unlink()
-
-
-def test_only_shell_commands_get_the_path_of_python_in_quotes(monkeypatch, before_jobs):
-    own = sys.executable
-    for name in ("ICHA_SNAKEMAKE", "PYTHONSAFEPATH"):
-        monkeypatch.setenv(name, "")
-    try:
-        monkeypatch.setattr(sys, "executable", "/it's a folder/python")
-        before_jobs.prepare_process()
-        shell = subprocess.run(f"printf %s {sys.executable}", shell=True, capture_output=True, text=True).stdout
-        assert shell == "/it's a folder/python" == os.fsdecode(spawn.get_executable())
-    finally:
-        spawn.set_executable(own)
 
 
 def test_files_of_the_working_directory_do_not_replace_modules(tmp_path, monkeypatch):
@@ -304,43 +233,3 @@ with whole_file({str(tmp_path / "folder/large.nc")!r}) as temporary:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=REPOSITORY)
     assert f"OSError: [Errno 27] File too large: '{tmp_path}/folder'" in done.stderr.splitlines()[-1]
     assert list((tmp_path / "folder").iterdir()) == []
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="needs /proc")
-def test_content_name_and_record_of_a_result_reach_the_disk_in_this_order(job, monkeypatch):
-    done = []
-    sync, replace = os.fsync, os.replace
-    named = {"runs": "folder", "b.nc": "result", "b.nc.json": "record"}
-
-    def what(path):
-        name = Path(path).name
-        return named.get(name, named.get(name[1:-14]))  # a temporary file counts as its target
-
-    monkeypatch.setattr(
-        os, "fsync", lambda file: done.append(("sync", what(os.readlink(f"/proc/self/fd/{file}")))) or sync(file)
-    )
-    monkeypatch.setattr(os, "replace", lambda a, b: done.append(("name", what(b))) or replace(a, b))
-    with whole_file(job.results / "runs/b.nc") as temporary:
-        temporary.write_text("a result")
-    write_checksum(job.results, "runs/b.nc")
-    result = [("sync", "result"), ("name", "result"), ("sync", "folder")]
-    assert done == [*result, ("sync", "record"), ("name", "record"), ("sync", "folder")]
-
-
-@pytest.mark.parametrize("exists", [True, False], ids=["with_its_result", "alone"])
-def test_a_damaged_record_of_snakemake_is_removed(exists, tmp_path, monkeypatch, before_jobs):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(before_jobs, "hold_lock", lambda path: None)
-    result = Path(RESULTS, "b.nc")
-    aside = result.with_name("b.nc.damaged")
-    record = Path(".snakemake/metadata", urlsafe_b64encode(str(result).encode()).decode())
-    for file, content in ((result, b"a result"), (record, b'{"rule": "run"\xfd')):
-        file.parent.mkdir(parents=True)
-        file.write_bytes(content)
-    if not exists:
-        result.unlink()
-    campaign(before_jobs, dry_run=True)
-    assert record.exists() and result.exists() == exists
-    campaign(before_jobs)
-    assert not record.exists() and not result.exists()
-    assert (aside.read_bytes() == b"a result") if exists else not aside.exists()

@@ -7,41 +7,29 @@ import ast
 import os
 import re
 import shutil
-import sys
 import time
-from pathlib import Path
 
 import pytest
 from conftest import REPOSITORY, SMOKE, copy_project, snakemake
+from tiny_campaign import CAMPAIGN
 
-from icha.contact.models import MODELS
-
-RUNS_AND_AFTER = {
-    "run",
-    "campaign_dataset",
-    "table",
-    "comparison",
-    "model_error",
-    "answers",
-    "sensitivity",
-    "checks",
-    "verdict",
-    "figure",
-    "report_page",
-}
+AFTER_RUNS = {"analyse", "verdict", "figure", "report_page"}
+# Beginnings of the names of rules of batches.
+BATCHES = ("make_surfaces", "compute_theories", "run")
 
 
 def planned(project, *arguments):
-    """Return the number of jobs of each rule that would run, and the messages of these jobs."""
+    """Return the names of the rules that would run (of batches, the beginnings), and how many files are outdated."""
     plan = snakemake(project, "--dry-run", *arguments)
     text = plan.stdout
     assert plan.returncode == 0, text
-    jobs = {}
+    rules = set()
     if "Nothing to be done" not in text:
         table = text.split("Job stats:")[1].split("total")[0]
-        jobs = {name: int(count) for name, count in re.findall(r"^(\w+) +(\d+)$", table, re.MULTILINE)}
-        jobs.pop("all", None)
-    return jobs, re.findall(r"^Job \d+: (.*)$", text, re.MULTILINE)
+        names = re.findall(r"^(\w+) +\d+$", table, re.MULTILINE)
+        rules = {next((each for each in BATCHES if name.startswith(f"{each}_")), name) for name in names} - {"all"}
+    warning = re.search(r"^outdated, .*?\)(?: and (\d+) more results?)?$", text, re.MULTILINE)
+    return rules, 1 + int(warning[1] or 0) if warning else 0
 
 
 @pytest.fixture(scope="module")
@@ -86,141 +74,87 @@ def test_comments_docstrings_formatting_and_touch_run_nothing_nor_does_a_fresh_c
         os.utime(file, (now, now))
     shutil.copytree(smoke / "results", clone / "results")
     shutil.copytree(smoke / ".snakemake", clone / ".snakemake")
-    assert planned(clone) == ({}, [])
+    assert planned(clone) == (set(), 0)
 
 
 @pytest.mark.parametrize(
-    ("path", "rules", "some"),
+    ("path", "rules", "outdated"),
     [
-        ("icha/boundary_elements/contact.py", RUNS_AND_AFTER, {"run": 6 + 1}),
-        ("icha/figures/fig13_loops.py", {"figure", "report_page"}, {"figure": 1}),
+        # Six runs in one study and one in another.
+        ("icha/boundary_elements/contact.py", {"run", *AFTER_RUNS}, 6 + 1),
+        ("icha/asperity/jkr.py", {"run", "compute_theories", *AFTER_RUNS}, 27 + 2),
+        ("icha/surfaces/spectrum.py", {"make_surfaces", "run", "compute_theories", *AFTER_RUNS}, 3 + 27 + 2),
+        ("icha/analysis/estimates.py", AFTER_RUNS, 0),
+        ("icha/figures/fig13_loops.py", {"figure", "report_page"}, 0),
     ],
 )
-def test_a_new_statement_runs_the_jobs_that_use_its_module(path, rules, some, own, edit):
+def test_a_new_statement_computes_again_what_its_module_computes(path, rules, outdated, own, edit):
     edit(path)
-    jobs, _ = planned(own)
-    assert set(jobs) == rules and some.items() <= jobs.items()
+    assert planned(own) == (rules, outdated)
 
 
 @pytest.mark.parametrize(
-    ("changes", "some", "without"),
+    ("changes", "rules", "outdated"),
     [
-        ({"name: ICHA developers": "name: A team"},
-         {"configuration": 1, "campaign_dataset": 1, "report_page": 1}, {"surface", "run", "reference"}),
-        ({"license: CC-BY-4.0": "license: CC0-1.0"}, {"run": 27, "surface": 3, "campaign_dataset": 1}, set()),
+        ({"name: ICHA developers": "name: A team"}, {"configuration", *AFTER_RUNS}, 0),
+        ({"license: CC-BY-4.0": "license: CC0-1.0"},
+         {"configuration", "make_surfaces", "compute_theories", "run", *AFTER_RUNS}, 3 + 27 + 2),
         ({"25 MPa": "25000 kPa", "fig1_jkr: {}": "fig1_jkr: {tabor_parameter: 4}"},
-         {"configuration": 1, "figure": 1, "report_page": 1}, {"run", "surface"}),
+         {"configuration", "figure", "report_page"}, 0),
         # The references contain curves of Fuller & Tabor for each material.
-        ({"2 mJ/m^2": "3 mJ/m^2"}, {"run": 3 + 1, "reference": 1}, {"surface"}),
-        ({"seeds: [1, 2]": "seeds: [1, 2, 3]"}, {"surface": 1, "run": 3 + 3}, set()),
+        ({"2 mJ/m^2": "3 mJ/m^2"}, {"configuration", "compute_theories", "run", *AFTER_RUNS}, 3 + 1 + 1),
+        ({"seeds: [1, 2]": "seeds: [1, 2, 3]"}, {"configuration", "make_surfaces", "run", *AFTER_RUNS}, 0),
     ],
 )  # fmt: skip
-def test_a_changed_value_runs_the_jobs_that_use_it(changes, some, without, own, edit):
+def test_a_changed_value_computes_again_what_depends_on_it(changes, rules, outdated, own, edit):
     for old, new in changes.items():
         edit(SMOKE, old, new)
-    jobs, messages = planned(own)
-    assert some.items() <= jobs.items() and not without & set(jobs)
-    if "seeds: [1, 2]" in changes:
-        assert all("seed 3" in each for each in messages if each.startswith(("Surface", "Sweep")))
+    assert planned(own) == (rules, outdated)
 
 
-def test_published_points_run_references(own, edit):
+def test_published_points_outdate_references_and_no_run(own, edit):
     edit("icha/references/literature.json", "0.185", "0.186")
-    jobs, messages = planned(own)
-    assert {"reference", "figure", "report_page"} <= set(jobs) and "Figure fig2_area_and_gap" in messages
-    assert "run" not in jobs
+    assert planned(own) == ({"compute_theories", "verdict", "figure", "report_page"}, 2)
 
 
-@pytest.fixture
-def fingerprint(monkeypatch):
-    """The module `workflow/fingerprint.py`, newly imported."""
-    monkeypatch.syspath_prepend(str(REPOSITORY / "workflow"))
-    monkeypatch.delitem(sys.modules, "fingerprint", raising=False)
-    import fingerprint
-
-    return fingerprint
-
-
-# Scripts that take long.
-EXPENSIVE = {"make_surface", "run_sweep", "make_references"}
+def computed(project):
+    """Run surfaces, runs and theories of the campaign `tiny`; return the names of the computed files."""
+    for log in project.glob("results/tiny/logs/*/*.log"):
+        log.unlink()
+    done = snakemake(project, "runs", "references", configuration="config/campaigns/tiny.yaml")
+    assert done.returncode == 0, done.stdout
+    logs = (log.read_text() for log in project.glob("results/tiny/logs/*/*.log"))
+    return {name for log in logs for name in re.findall(r"^\d+ of \d+: tiny/(\S+)$", log, re.MULTILINE)}
 
 
-def test_fingerprints_contain_the_modules_that_a_script_uses(fingerprint):
-    # A run imports the module of its model by name, a figure its own module.
-    by_name = {"run_sweep": [model.module for model in MODELS.values()], "draw_figure": ["icha.figures.fig1_jkr"]}
-    files = {
-        file.stem: fingerprint.files_of(file, *by_name.get(file.stem, ()))
-        for file in (REPOSITORY / "workflow/scripts").glob("*.py")
-    }
-    for module, scripts in {
-        "boundary_elements/contact": {"run_sweep"},
-        "equilibrium/newton": {"run_sweep"},
-        "asperity/jkr": {"run_sweep", "make_references"},
-        "simulation": {"run_sweep"},
-        "references/persson": {"make_references"},
-        "surfaces/spectrum": {"make_surface", "make_references"},
-        "configuration/campaign": set(),
-        "figures/style": set(),
-        "report/report": set(),
-    }.items():
-        assert {script for script in EXPENSIVE if f"icha/{module}.py" in files[script]} == scripts, module
-    for script, module in {
-        "draw_figure": "figures/style",
-        "make_report": "report/report",
-        "publish": "configuration/campaign",
-    }.items():
-        assert f"icha/{module}.py" in files[script]
+def test_only_new_and_changed_files_are_computed(tmp_path):
+    project = copy_project(REPOSITORY, tmp_path / "project")
+    configuration = project / "config/campaigns/tiny.yaml"
+    configuration.write_text(CAMPAIGN)
+    run = "runs/load/rough/seed{}/slope1/{}"
+    runs = {run.format(seed, material) for seed in (1, 2) for material in ("bare", "soft")}
+    assert computed(project) == runs | {"surfaces/rough/seed1", "surfaces/rough/seed2", "references/rough"}
+    assert computed(project) == set()
 
+    configuration.write_text(CAMPAIGN.replace("seeds: [1, 2]", "seeds: [1, 2, 3]"))
+    new = {run.format(3, material) for material in ("bare", "soft")}
+    assert computed(project) == new | {"surfaces/rough/seed3"}
+    configuration.write_text(CAMPAIGN)  # fewer runs
+    assert computed(project) == set()
 
-def test_fingerprints_of_contact_models_are_separate_and_exclude_what_changes_no_number(fingerprint):
-    script = REPOSITORY / "workflow/scripts/run_sweep.py"
-    asperities, patches = (set(fingerprint.files_of(script, model.module)) for model in MODELS.values())
-    assert any("/equilibrium/" in name for name in asperities - patches)
-    assert "icha/boundary_elements/contact.py" in patches - asperities
-    assert not any("/equilibrium/" in name for name in patches - asperities)
-    assert not {"job.py", "icha/support/printable.py", "icha/support/program.py"} & (asperities | patches)
-    # Modules that write and read datasets are part of the fingerprint.
-    assert {"icha/support/atomic_files.py", "icha/datasets/files.py"} <= asperities
-
-
-def test_fingerprints_refuse_imports_that_they_cannot_follow(tmp_path, fingerprint):
-    script = tmp_path / "script.py"
-    script.write_text("from icha import simulate\n")
-    with pytest.raises(ValueError, match="from the module that defines it"):
-        fingerprint.code_fingerprint(script)
-
-
-@pytest.mark.parametrize("cache", ["complete", "cut off", "not writable"])
-def test_a_changed_module_is_read_again_despite_the_cache(cache, tmp_path, fingerprint, monkeypatch):
-    monkeypatch.setattr(fingerprint, "_CACHE", tmp_path / "cache.json")
-    module = tmp_path / "module.py"
-    module.write_text('from os import path, sep\n\nNAME = "data.csv"\n')
-    first = fingerprint.code_fingerprint(module)
-    if cache == "not writable":
-        (tmp_path / "cache.json").mkdir()
-    fingerprint.save_cache()
-
-    def begin():
-        fingerprint._syntaxes.clear()
-        fingerprint._syntax_of.cache_clear()
-
-    begin()
-    if cache == "cut off":
-        (tmp_path / "cache.json").write_text((tmp_path / "cache.json").read_text()[:-9])
-    with monkeypatch.context() as reading:
-        if cache == "complete":
-            reading.setattr(fingerprint, "_read", None)
-        assert fingerprint.code_fingerprint(module) == first
-    begin()
-    module.write_text('from os import path, sep\n\nNAME = "data.txt"\n')
-    assert fingerprint.code_fingerprint(module) != first
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="needs /proc/uptime")
-def test_files_of_the_system_that_a_module_names_are_not_part_of_it(fingerprint, tmp_path):
-    script = tmp_path / "ask.py"
-    script.write_text("UPTIME = '/proc/uptime'\n")
-    first, before = fingerprint.code_fingerprint(script), Path("/proc/uptime").read_text()
-    while Path("/proc/uptime").read_text() == before:
-        time.sleep(0.01)
-    assert fingerprint.code_fingerprint(script) == first
+    # Results in another place, without records of Snakemake; one is cut off, one has been removed.
+    other = copy_project(REPOSITORY, tmp_path / "other")
+    shutil.copy(configuration, other / "config/campaigns/tiny.yaml")
+    shutil.copytree(project / "results", other / "results")
+    assert computed(other) == set()
+    cut_off, removed = (run.format(1, "bare"), run.format(2, "soft"))
+    os.truncate(other / f"results/tiny/{cut_off}.nc", 5000)
+    (other / f"results/tiny/{removed}.nc").unlink()
+    assert computed(other) == {cut_off, removed}
+    # An older result in place of a newer one.
+    (other / "config/campaigns/tiny.yaml").write_text(CAMPAIGN.replace("25 MPa", "20 MPa", 1))
+    changed = computed(other)
+    assert changed
+    for name in changed:
+        shutil.copy(project / f"results/tiny/{name}.nc", other / f"results/tiny/{name}.nc")
+    assert computed(other) == changed

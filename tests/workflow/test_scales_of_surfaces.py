@@ -17,6 +17,7 @@ from icha.path.targets import Path
 from icha.simulation import simulate
 from icha.surfaces.spectrum import SelfAffineSpectrum
 from icha.surfaces.tabulated_spectrum import SpectrumTable
+from icha.tasks.surface import make_surface
 
 LENGTHS = {"period": 100e-6, "rolloff_wavelength": 50e-6, "short_wavelength": 12e-6, "hurst": 0.8}
 PROMISES = {
@@ -30,7 +31,6 @@ PROMISES = {
 def runs(tmp_path, monkeypatch):
     """Return the promised values of the runs of a study, and their surfaces as the jobs make them."""
     monkeypatch.syspath_prepend(str(REPOSITORY / "workflow/scripts"))
-    from make_surface import make_surface
 
     def made(kind, promise, amplitudes, boundary):
         spectrum = SelfAffineSpectrum(**LENGTHS, rms_slope=0.3)

@@ -17,10 +17,12 @@ from traces import traces
 
 from icha.configuration.cases import campaign_sha256
 from icha.configuration.load import load_configuration
+from icha.support.checksums import changed_files
 
 # A campaign that confirms an unusual value.
 RANGE = "config/campaigns/cmc_range.yaml"
 PROMISED = """
+SHA256SUMS
 surfaces/challenge/seed1.nc surfaces/challenge/seed2.nc
 runs/challenge/challenge/seed2/slope1/cmc_adhesionless.nc
 runs/challenge/challenge/seed2/slope1/boundary_elements/cmc_adhesionless.nc
@@ -38,8 +40,7 @@ def results_of(project):
     return {
         str(file.relative_to(folder)): hashlib.sha256(file.read_bytes()).hexdigest()
         for file in sorted(folder.rglob("*"))
-        if file.is_file()
-        and file.relative_to(folder).parts[0] not in ("logs", "benchmarks", "checksums", "run_times.tsv")
+        if file.is_file() and file.relative_to(folder).parts[0] not in ("logs", "benchmarks", "run_times.tsv")
     }
 
 
@@ -51,12 +52,13 @@ def test_all_promised_files_exist(smoke):
     }
     assert promised <= files.keys()
     results = smoke / "results/smoke"
-    for job in [file for file in files if file.startswith(("surfaces", "runs"))]:
-        assert (results / "logs" / job).with_suffix(".log").is_file()
-        benchmark = (results / "benchmarks" / job).with_suffix(".jsonl")
-        assert json.loads(benchmark.read_text().splitlines()[0])["s"] > 0
+    for batch in ("surfaces/surfaces_0", "runs/challenge_asperities_0", "references/theories_0"):
+        assert (results / f"logs/{batch}.log").is_file()
+        assert json.loads((results / f"benchmarks/{batch}.jsonl").read_text().splitlines()[0])["s"] > 0
     # Runs report their progress.
-    assert len((results / "logs/runs/challenge/challenge/seed1/slope1/cmc.log").read_text().splitlines()) >= 4
+    log = (results / "logs/runs/challenge_asperities_0.log").read_text()
+    assert "\n2 of " in log and log.count("stop 1 of") >= 2
+    assert changed_files(results) == []
     checks = json.loads((results / "checks.json").read_text())
     assert len({check["subject"] for check in checks}) >= 7 and all(check["passed"] for check in checks)
     used = yaml.safe_load((results / "config.used.yaml").read_text())
@@ -78,7 +80,7 @@ def test_the_dataset_states_its_origin(smoke):
     with xr.open_dataset(smoke / "results/smoke/runs/challenge/challenge/seed1/slope1/cmc.nc") as run:
         assert {"title", "summary", "Conventions", "source", "references"} <= set(run.attrs)
         assert run.attrs["campaign"] == "smoke" and run.attrs["study"] == "challenge"
-        assert len(run.attrs["config_sha256"]) == 64
+        assert len(run.attrs["config_sha256"]) == len(run.attrs["program_sha256"]) == 64
 
 
 def test_the_deposit_agrees_with_its_checksums(smoke):
@@ -102,9 +104,7 @@ def test_no_paths_users_hosts_or_times_in_results(smoke):
 
 def test_a_second_call_does_nothing(smoke, tmp_path):
     def times():
-        # Snakemake touches the outputs of a job that has several, and their checksum files record the new time.
-        files = (smoke / "results").rglob("*")
-        return {file: file.stat().st_mtime_ns for file in files if "checksums" not in file.parts}
+        return {file: file.stat().st_mtime_ns for file in (smoke / "results").rglob("*")}
 
     before = times()
     again = snakemake(smoke, "all", "references", "publish", "--snakefile", "workflow/Snakefile")
@@ -116,7 +116,7 @@ def test_a_second_call_does_nothing(smoke, tmp_path):
 def test_a_large_campaign_can_be_planned(smoke, tmp_path):
     configuration = REPOSITORY / "config/campaigns/validation.yaml"
     plan = snakemake(smoke, "all", "publish", "-n", "-d", str(tmp_path), configuration=configuration)
-    assert plan.returncode == 0 and "campaign_dataset" in plan.stdout and "deposit" in plan.stdout, plan.stdout
+    assert plan.returncode == 0 and "analyse" in plan.stdout and "deposit" in plan.stdout, plan.stdout
 
 
 def test_the_campaigns_of_the_tests_have_every_figure():
@@ -124,21 +124,6 @@ def test_the_campaigns_of_the_tests_have_every_figure():
     indenter = load_configuration(REPOSITORY / "config/campaigns/indenter.yaml").campaign
     drawn = {*campaign.figures.by_name(), *indenter.figures.by_name()}
     assert drawn == {file.stem for file in (REPOSITORY / "icha/figures").glob("fig*.py")}
-
-
-def test_a_call_removes_temporary_files_of_killed_calls_and_refuses_a_second_call(project, before_jobs, monkeypatch):
-    (project / "results/smoke/verdict.txt").unlink()
-    left = project / "results/smoke/publish/.smoke-1.0.0.zip.0a1b2c3d.part"
-    left.write_bytes(b"a part")
-    monkeypatch.chdir(project)
-    assert before_jobs.hold_lock(".snakemake/smoke.lock") is None
-    refused = snakemake(project)
-    assert refused.returncode != 0 and "Traceback" not in refused.stdout
-    assert f"Process {os.getpid()} is running this campaign" in refused.stdout
-    assert not Path("results/smoke/verdict.txt").exists()
-    before_jobs.locks.pop().close()
-    assert snakemake(project).returncode == 0
-    assert Path("results/smoke/verdict.txt").exists() and not left.exists()
 
 
 def test_a_wrong_configuration_is_a_message_without_traceback(smoke, tmp_path):
@@ -154,13 +139,13 @@ def configuration_of(monkeypatch):
     """Return the function that reads the configuration of a call, with the files and values of its command line."""
     monkeypatch.syspath_prepend(str(REPOSITORY / "workflow"))
     monkeypatch.chdir(REPOSITORY)
-    import command_line
+    import prepare
 
-    monkeypatch.setattr(command_line.logger, "warning", warnings := Mock())
+    monkeypatch.setattr(prepare.logger, "warning", warnings := Mock())
 
     def read(*files, **values):
         settings = SimpleNamespace(configfiles=files, config=values)
-        command_line.campaign_configuration(SimpleNamespace(config_settings=settings), str(REPOSITORY))
+        prepare.read_configuration(SimpleNamespace(config_settings=settings), str(REPOSITORY))
         return warnings.call_args.args[0]
 
     return read

@@ -8,7 +8,8 @@ SOURCE = cache(lambda: publishable_source(CONFIGURATION, ROOT, RESULTS))
 
 rule deposit:
     input:
-        lambda wildcards: SOURCE() and [FILES.configuration, *INPUTS, *FILES.computed],
+        results=lambda wildcards: SOURCE() and [FILES.configuration, *INPUTS, *FILES.computed],
+        checksums=FILES.checksums,
     output:
         checksums=f"{FILES.deposit}/SHA256SUMS",
         archive=f"{FILES.deposit}.zip",
@@ -23,7 +24,7 @@ rule deposit:
         runtime=30,
     params:
         results=as_it_is(RESULTS),
-        named_files=as_it_is(NAMED_FILES),
+        given=as_it_is(list(NAMED_FILES)),
         project=as_it_is(ROOT),
         # The deposit contains the source, including comments.
         revision=lambda wildcards: SOURCE().revision,

@@ -1,0 +1,75 @@
+"""An interrupted call loses at most the results that were being computed; the next call goes on."""
+
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+import yaml
+from conftest import REPOSITORY, copy_project, modules_of, snakemake, snakemake_command, wait_for
+from tiny_campaign import CAMPAIGN
+
+CONFIGURATION = "config/campaigns/tiny.yaml"
+MANY = yaml.safe_load(CAMPAIGN)
+MANY["studies"]["load"]["seeds"] = list(range(1, 31))
+
+
+def start(project):
+    """Start a call in a new process group."""
+    command, environment = snakemake_command("runs", configuration=CONFIGURATION)
+    environment["PYTHONPATH"] = modules_of(project)
+    return subprocess.Popen(
+        command,
+        cwd=project,
+        env=environment,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        process_group=0,
+    )
+
+
+def runs(project):
+    """Return content and number (inode) of each run."""
+    files = (project / "results/tiny/runs").rglob("*.nc")
+    return {str(file.relative_to(project)): (file.read_bytes(), file.stat().st_ino) for file in files}
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="process groups")
+@pytest.mark.parametrize("whole_group", [True, False], ids=["all_processes", "snakemake_alone"])
+def test_a_killed_call_loses_only_what_was_being_computed(whole_group, tmp_path):
+    project = copy_project(REPOSITORY, tmp_path / "project")
+    (project / CONFIGURATION).write_text(yaml.safe_dump(MANY))
+    call = start(project)
+    wait_for(lambda: len(runs(project)) >= 5)
+    os.killpg(call.pid, signal.SIGKILL) if whole_group else call.kill()
+    call.wait()
+    before = runs(project)
+    assert 5 <= len(before) < 60
+    again = snakemake(project, "runs", configuration=CONFIGURATION)
+    assert again.returncode == 0, again.stdout
+    after = runs(project)
+    assert len(after) == 60
+    # The files are the same, not only their contents. A batch that outlives its call may finish one run more.
+    assert sum(after[name] == file for name, file in before.items()) >= len(before) - (not whole_group)
+    assert not list((project / "results").rglob(".*.part"))
+    assert "Nothing to be done" in snakemake(project, "runs", configuration=CONFIGURATION).stdout
+
+
+def test_two_calls_at_once_and_temporary_files_of_killed_calls(project, monkeypatch):
+    monkeypatch.syspath_prepend(str(REPOSITORY / "workflow"))
+    import prepare
+
+    (project / "results/smoke/verdict.txt").unlink()
+    left = project / "results/smoke/publish/.smoke-1.0.0.zip.0a1b2c3d.part"
+    left.write_bytes(b"a part")
+    monkeypatch.chdir(project)
+    assert prepare.hold_lock(".snakemake/smoke.lock") is None
+    refused = snakemake(project)
+    assert refused.returncode != 0 and "Traceback" not in refused.stdout
+    assert f"Process {os.getpid()} is running this campaign" in refused.stdout
+    assert not (project / "results/smoke/verdict.txt").exists()
+    prepare.locks.pop().close()
+    assert snakemake(project).returncode == 0
+    assert (project / "results/smoke/verdict.txt").exists() and not left.exists()
