@@ -25,9 +25,7 @@ include: "workflow/rules/common.smk"
 
 # The stamp of a file decides whether the file is valid. Snakemake computes missing files, so outdated files are removed.
 if workflow.is_main_process:
-    campaign = prepare.Results(
-        RESULTS, CAMPAIGN.name, CONFIGURATION.origin, ROOT, STAMPS, dry_run=workflow.output_settings.dryrun
-    )
+    campaign = prepare.Results(RESULTS, CONFIGURATION.origin, STAMPS, dry_run=workflow.output_settings.dryrun)
 
 
 include: "workflow/rules/inputs.smk"

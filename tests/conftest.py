@@ -68,11 +68,6 @@ def pytest_collection_modifyitems(items):
             item.add_marker("no_cover")
 
 
-def modules_of(project):
-    """Return the PYTHONPATH of the package and the plugins of a copy of the project."""
-    return os.pathsep.join([str(project), str(project / "workflow/plugins")])
-
-
 def snakemake_command(*arguments, configuration=SMOKE):
     """Return command and environment of a call of Snakemake in a copy of the project."""
     environment = os.environ | {"PYTHONDONTWRITEBYTECODE": "1"}
@@ -87,7 +82,7 @@ def snakemake(project, *arguments, configuration=SMOKE):
     process.
     """
     command, environment = snakemake_command(*arguments, configuration=configuration)
-    environment["PYTHONPATH"] = modules_of(project)
+    environment["PYTHONPATH"] = str(project)
     with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as output:
         arguments = project, command[2:], environment, output
         call = multiprocessing.get_context("fork").Process(target=_call, args=arguments)
@@ -106,7 +101,7 @@ def _call(project, arguments, environment, output):
     os.environ.clear()
     os.environ.update(environment)
     sys.argv = arguments
-    sys.path[:0] = modules_of(project).split(os.pathsep)
+    sys.path[:0] = [str(project)]
     icha.__file__ = icha.__spec__.origin = str(project / "icha/__init__.py")
     icha.__path__[:] = icha.__spec__.submodule_search_locations[:] = [str(project / "icha")]
     for file in (REPOSITORY / "workflow").glob("*.py"):

@@ -61,9 +61,7 @@ def _shorten(path: str | Path) -> Path:
 class Results:
     """Folder of results of one campaign. One call of Snakemake at a time computes results in the folder."""
 
-    def __init__(
-        self, folder: str, name: str, file: str, workflow: str, stamps: Mapping[str, Stamp], *, dry_run: bool = False
-    ):
+    def __init__(self, folder: str, file: str, stamps: Mapping[str, Stamp], *, dry_run: bool = False):
         """Lock the folder and remove outdated results, because Snakemake computes what is missing.
 
         A dry run or a call that only reports changes nothing.
@@ -71,14 +69,12 @@ class Results:
         Parameters
         ----------
         folder : folder of the results, relative to the working directory; no other configuration may own the folder.
-        name : name of the campaign.
         file : configuration file of the campaign.
-        workflow : folder of the workflow.
         stamps : expected stamps of computed files, by path.
         dry_run : whether this call is a dry run.
         """
-        self.folder, self._origin = Path(folder), (Path(file).resolve(), Path(workflow))
-        if reason := find_conflict(self.folder, name, *self._origin):
+        self.folder, self._origin = Path(folder), Path(file).resolve()
+        if reason := find_conflict(self.folder, self._origin):
             raise SystemExit(f"{reason} Nothing was computed.")
         reports = dry_run or any(REPORTING.fullmatch(argument.partition("=")[0]) for argument in sys.argv[1:])
         self._other_process = None if reports else hold_lock(f".snakemake/{self.folder.name}.lock")
@@ -116,7 +112,7 @@ class Results:
                 if reason := probe_folder(folder):
                     raise reason
         self.remove_left_over()
-        claim(self.folder, *self._origin)
+        claim(self.folder, self._origin)
         note_versions(self.folder)
 
     def remove_left_over(self) -> None:

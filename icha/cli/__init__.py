@@ -5,7 +5,6 @@ from typing import Annotated
 import typer
 
 from icha.cli.answer import answer
-from icha.cli.campaigns import list_
 from icha.cli.check import check
 from icha.cli.deposits import reproduce, upload, verify
 from icha.cli.describe import describe
@@ -49,7 +48,6 @@ def icha(
     """
 
 
-app.command("list")(reports_errors(list_))
 for command in (new, describe, run, answer, show, explore, check, verify, reproduce, upload):
     app.command()(reports_errors(command))
 

@@ -14,7 +14,7 @@ from typing import Annotated
 import typer
 from typer import confirm
 
-from icha.cli.project import FAILED, Anyway, Cores, Large, UserError, echo, option, shorten_path
+from icha.cli.project import FAILED, Cores, Large, UserError, echo, option, shorten_path
 from icha.cli.run import run
 from icha.support import formatting
 from icha.support.formatting import format_count, printable
@@ -88,7 +88,6 @@ def reproduce(
         ),
     ] = None,
     cores: Cores = None,
-    anyway: Anyway = False,
     large: Large = False,
 ) -> None:
     """Compute the results of a deposit again and compare every number with the published number.
@@ -113,7 +112,7 @@ def reproduce(
             _introduce(deposit, original, folder)
             target = target or Path(tempfile.mkdtemp(prefix="icha-reproduce-")).resolve()
             copy = prepare_rerun(target, original)
-            status = _run(copy, [f"results/{name}/{path}" for path in runs] or ["all"], cores, anyway)
+            status = _run(copy, [f"results/{name}/{path}" for path in runs] or ["all"], cores)
             results = copy / "results" / name
             if not results.is_dir():
                 echo("Error: nothing was computed", err=True, fg="red")
@@ -155,7 +154,7 @@ def _introduce(deposit: Path, original: Path, folder: Path | None) -> None:
     echo(f"writes to:  {shorten_path(folder) if folder else 'a temporary folder'}")
 
 
-def _run(project: Path, targets: list[str], cores: int | None, anyway: bool) -> int:
+def _run(project: Path, targets: list[str], cores: int | None) -> int:
     """Compute targets of the configuration in the folder `project`; return the exit status."""
     from icha.datasets.results import CONFIGURATION
     from icha.support.program import own_workflow
@@ -163,7 +162,7 @@ def _run(project: Path, targets: list[str], cores: int | None, anyway: bool) -> 
     # In a working directory inside a clone, `run` would use the workflow of the clone, not the installed workflow.
     with contextlib.chdir(own_workflow()):
         try:
-            run(str(project / CONFIGURATION), targets, cores=cores, folder=project, anyway=anyway)
+            run(str(project / CONFIGURATION), targets, cores=cores, folder=project)
         except typer.Exit as end:
             return end.exit_code
     return 0

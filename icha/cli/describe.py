@@ -2,6 +2,7 @@
 
 import statistics
 import sys
+from collections import Counter
 from pathlib import Path
 from typing import Annotated
 
@@ -14,10 +15,8 @@ from icha.cli.project import (
     Folder,
     echo,
     find_configuration,
-    find_workflow,
     project,
     read_configuration,
-    read_profile,
     shorten_path,
 )
 from icha.cli.scans import describe_scan
@@ -36,14 +35,13 @@ def describe(
 ) -> None:
     """Print what a campaign computes, which results exist, and the time, memory and disk space for missing results.
 
-    The command computes nothing. Times are estimates, usually right within a factor of two. If some runs are done, the
-    estimates use the times of these runs. A run counts as done if its file was made with the present settings;
-    `icha run -n` also detects changes of the program. For each measured surface, the command prints the number of
-    summits, whether the spectrum ends in noise, and recommended keys.
+    The command computes nothing. Times are estimates, usually right within a factor of two. A run counts as done if its
+    file was computed with the present settings and the present program. For each measured surface, the command prints
+    the number of summits, whether the spectrum ends in noise, and recommended keys.
     """
     path, home = find_configuration(config), (folder or project()).resolve()
     campaign = read_configuration(path, home).campaign
-    print_plan(path, campaign, find_workflow(), home, cores or DEFAULT_CORES, runs=runs)
+    print_plan(path, campaign, home, cores or DEFAULT_CORES, runs=runs)
     _print_scans(campaign, home / "results" / campaign.name if plot else None)
 
 
@@ -102,28 +100,25 @@ def _draw_scan(section, file: Path) -> None:
     echo(f"before and after the preparation: {shorten_path(file)}")
 
 
-def print_plan(path: Path, campaign, workflow: Path, home: Path, cores: int, *, runs=False, profile=None) -> None:
+def print_plan(path: Path, campaign, home: Path, cores: int, *, runs=False, local=True) -> None:
     """Print what a campaign computes, which results exist, the cost of missing results, and what prevents a run.
 
     Parameters
     ----------
     path : configuration file of the campaign.
     campaign : content of the configuration.
-    workflow : folder of the workflow.
     home : folder that contains results/.
     cores : number of cores in use.
     runs : whether to print a line for every file.
-    profile : folder of the Snakemake profile in use; None is the default profile.
+    local : whether jobs run on this machine.
     """
     from rich.console import Console
     from rich.text import Text
 
     from icha.deposit.metadata import licence_problem
     from icha.planning.ownership import find_conflict
-    from icha.planning.plan import FAILED, plan
-    from icha.planning.requirements import find_shortages
+    from icha.planning.plan import FAILED, OUTDATED, find_shortages, plan
     from icha.planning.validity import expected_validity
-    from icha.support.checksums import damaged
 
     results = home / "results" / campaign.name
     items = plan(campaign, results)
@@ -137,26 +132,26 @@ def print_plan(path: Path, campaign, workflow: Path, home: Path, cores: int, *, 
     if runs:
         _print_files(console, items)
     _print_sums(console, items)
-    _print_cost(console, items, cores, damaged(results))
+    _print_cost(console, items, cores)
     for name, study in campaign.studies.items():
         if study.accuracy is not None:
             print_line("bold", "answer", _accuracy(name, study))
-    for file in damaged(results):
-        print_line("red", "damaged", f"{file}: will be computed again")
+    for reason, count in Counter(item.reason for item in items if item.state == OUTDATED).items():
+        print_line("red", "outdated", f"{format_count(count, 'file')}, because {reason}: will be computed again")
     for item in items:
-        if item.is_run and item.state == FAILED:
+        if item.state == FAILED:
             print_line("red", "failed", f"{item.path}: {item.reason}")
     for statement in expected_validity(campaign):
         print_line("bold" if statement.good else "bold yellow", statement.about, statement.text)
     problem = licence_problem(campaign)
     obstacles = {
-        "cannot be run": find_conflict(shorten_path(results), campaign.name, path, workflow),
+        "cannot be run": find_conflict(shorten_path(results), path),
         "cannot be published": problem and f"{shorten_path(path)}: {': '.join(problem)}",
     }
     for name, reason in obstacles.items():
         if reason:
             print_line("red", name, reason)
-    for shortage in find_shortages(items, cores, results, read_profile(profile or workflow / "profiles/default")):
+    for shortage in find_shortages(items, cores, results, local=local):
         print_line("red", "too small", shortage)
 
 
@@ -190,38 +185,34 @@ def _print_sums(console, items) -> None:
     """Print a table of numbers of files, times, memory and disk space, with a row for each kind of result."""
     from rich.table import Table
 
-    from icha.planning.costs import WORKFLOW
-    from icha.planning.plan import DONE, FAILED, start_up
+    from icha.planning.plan import DONE, FAILED
 
-    def cells(items, further=0.0):
+    def cells(items):
         left = [item for item in items if item.to_do]
         states = [item.state for item in items]
         counts = len(items), states.count(DONE), states.count(FAILED), len(left)
         each = formatting.duration(statistics.median(item.cost.seconds for item in items))
-        work = formatting.duration(sum(item.work for item in left) + further) if left else ""
+        work = formatting.duration(sum(item.work for item in left)) if left else ""
         memory, disk = max(item.cost.memory for item in items), sum(item.cost.disk for item in items)
         return [*(str(count or "") for count in counts), each, work, formatting.size(memory), formatting.size(disk)]
 
     table = Table(box=None, pad_edge=False, header_style="dim", show_footer=True)
     table.add_column("", footer="all", overflow="fold")
-    further = start_up(items) + WORKFLOW.job * sum(item.to_do for item in items)
     headings = ("files", "done", "failed", "to do", "each", "core time", "memory", "disk")
-    for heading, footer in zip(headings, cells(items, further), strict=True):
+    for heading, footer in zip(headings, cells(items), strict=True):
         # In a narrow terminal, only names are wrapped, not numbers.
         table.add_column(heading, footer="" if heading == "each" else footer, justify="right", no_wrap=True)
-    for kind in dict.fromkeys(item.part for item in items):
-        table.add_row(kind, *cells([item for item in items if item.part == kind]))
-    if further:
-        table.add_row("starting and scheduling", *[""] * 5, formatting.duration(further))
+    for group in dict.fromkeys(item.group for item in items):
+        table.add_row(group, *cells([item for item in items if item.group == group]))
     console.print(table)
     console.print()
 
 
-def _print_cost(console, items, cores: int, damaged) -> None:
-    from icha.planning.plan import memory_on, time_on
+def _print_cost(console, items, cores: int) -> None:
+    from icha.planning.plan import RUNS, memory_on, time_on
 
-    runs = [item for item in items if item.is_run]
-    if damaged or any(item.to_do for item in items):
+    runs = [item for item in items if item.part == RUNS]
+    if any(item.to_do for item in items):
         time, memory = formatting.duration(time_on(items, cores)), formatting.size(memory_on(items, cores))
         disk = formatting.size(sum(item.cost.disk for item in items))
         console.print(
@@ -230,5 +221,3 @@ def _print_cost(console, items, cores: int, damaged) -> None:
         )
     else:
         console.print(f"{format_count(len(runs), 'run')}; all results exist.")
-    if changed := sum(item.state == "changed" for item in runs):
-        console.print(f"{format_count(changed, 'run')} made with other settings: will be computed again.")

@@ -1,28 +1,22 @@
-"""The command `icha run`: start Snakemake, show its progress, and report the outcome."""
+"""The command `icha run`: start Snakemake, count the finished files, and report the outcome."""
 
-import contextlib
 import itertools
-import json
-import os
 import re
-import signal
 import subprocess
 import sys
-import tempfile
-import threading
-from collections.abc import Mapping
+from collections import Counter
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from icha.cli.describe import print_plan
+from icha.cli.progress import Progress, run_process
 from icha.cli.project import (
     DEFAULT,
     DEFAULT_CORES,
     FAILED,
     TARGETS,
-    Anyway,
     Config,
     Cores,
     Folder,
@@ -37,12 +31,12 @@ from icha.cli.project import (
     shorten_path,
 )
 from icha.support import formatting
-from icha.support.formatting import format_count
+from icha.support.formatting import format_count, printable
 
-STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-MOST_LINES = 12  # largest number of lines that are printed about a failure
-# Lines that every call of Snakemake prints. The reason for an error comes after these lines.
-PREAMBLE = r"Using workflow specific profile|Assuming unrestricted|host: |Building DAG of jobs|total +\d+$"
+# Largest number of lines that are printed about missing files, failed runs or the output of Snakemake.
+MOST_LINES = 12
+# Largest number of times that the seeds of a study are increased to reach its accuracy.
+_MOST_EXTENSIONS = 2
 
 
 def run(
@@ -61,20 +55,20 @@ def run(
     ] = None,
     folder: Folder = None,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", "-n", help="Print the plan and the jobs that would run; compute nothing.")
+        bool, typer.Option("--dry-run", "-n", help="Print the plan and the number of jobs; compute nothing.")
     ] = False,
-    anyway: Anyway = False,
 ) -> None:
-    """Compute the results of a campaign that are missing or out of date.
+    """Compute the results of a campaign that are missing or outdated.
 
-    In a terminal, a table shows the progress; otherwise the command prints a line for each finished job. At the end the
+    In a terminal, a bar shows the progress; otherwise the command prints a line at least once a minute. At the end the
     command prints failures, and the paths of figures, dataset and report. Ctrl-C stops the campaign; repeat the command
     to continue.
 
     Exit status: 0 if all requested results exist, 1 if a job failed (independent jobs run nevertheless), 2 if the
-    campaign cannot start, for example because memory or disk space is probably too small.
+    campaign cannot start.
     """
     from icha.planning.ownership import find_conflict
+    from icha.planning.validity import expected_validity
 
     workflow = find_workflow()
     targets = list(targets or [])
@@ -86,11 +80,11 @@ def run(
     campaign = read_configuration(path, folder).campaign
     results = folder / "results" / campaign.name
     profile_folder = _profile_folder(profile, workflow)
-    names = itertools.takewhile(lambda target: not target.startswith("-"), targets)
+    names = list(itertools.takewhile(lambda target: not target.startswith("-"), targets))
     if unknown := [name for name in names if name not in TARGETS and not name.startswith(f"results/{campaign.name}/")]:
         expected = f"{', '.join(TARGETS)}, or a file under results/{campaign.name}/"
         raise UserError(f"{', '.join(unknown)}: not a target; expected {expected}")
-    if reason := find_conflict(shorten_path(results), campaign.name, path, workflow):
+    if reason := find_conflict(shorten_path(results), path):
         raise UserError(f"{reason} Nothing was started")
     # With -P, a file in the working directory cannot replace a module of the same name.
     program = [sys.executable, "-P", "-m", "snakemake"]
@@ -101,29 +95,25 @@ def run(
         # Snakemake finds profiles/default without this option.
         *(["--workflow-profile", str(profile_folder)] if profile else []),
     ]
+    cores = cores or DEFAULT_CORES
+    # Jobs of other executors run on other machines.
+    local = profile is None or read_profile(profile_folder).get("executor", "local") == "local"
     if dry_run:
         jobs = _dry_run([*program, *targets, *options, "--dry-run"], workflow)
-        print_plan(path, campaign, workflow, folder, cores or DEFAULT_CORES, profile=profile_folder)
+        print_plan(path, campaign, folder, cores, local=local)
         echo(jobs)
         return
-    from icha.planning.validity import expected_validity
-
     every = not set(targets) - {"all", "report", "publish"}
-    if not set(targets) - set(TARGETS):
-        _print_validity(expected_validity(campaign))
+    if not set(names) - set(TARGETS):
+        _print_statements(expected_validity(campaign))
 
     def compute(campaign, targets):
         """Compute targets with Snakemake, and print the outcome; return whether all checks passed."""
-        from icha.planning.plan import plan
-
-        items = plan(campaign, results)
-        if not anyway:
-            _refuse_if_too_large(items, targets, cores or DEFAULT_CORES, results, read_profile(profile_folder))
-        return _compute([*program, *targets, *options, "--logger", "icha"], workflow, folder, campaign, items)
+        return _compute([*program, *targets, *options], workflow, campaign, results, targets, cores, local)
 
     choices = {}
     if every:
-        campaign, choices = _reach_accuracy(campaign, path, folder, cores or DEFAULT_CORES, compute)
+        campaign, choices = _reach_accuracy(campaign, path, folder, cores, compute)
     passed = compute(campaign, targets)
     if every:
         _print_checks(campaign, results)
@@ -135,29 +125,150 @@ def run(
         echo(f"deposit: {shorten_path(results / 'publish' / f'{campaign.name}-{version}.zip')}")
 
 
-def _compute(command: list[str], workflow: Path, folder: Path, campaign, items) -> bool:
+def _profile_folder(profile: str | None, workflow: Path) -> Path:
+    """Find the folder of a Snakemake profile by its path or its name; None means the default profile."""
+    for path in (Path(profile or "default"), workflow / "profiles" / (profile or "default")):
+        if (path / "config.yaml").is_file():
+            return path.resolve()
+    names = sorted(path.parent.name for path in (workflow / "profiles").glob("*/config.yaml"))
+    raise UserError(f"--profile {profile}: no folder with a config.yaml; expected a folder, or {', '.join(names)}")
+
+
+def _dry_run(command: list[str], workflow: Path) -> str:
+    """Plan with Snakemake and run nothing; return how many jobs would run. After an error, print the error and exit."""
+    done = subprocess.run(command, cwd=workflow, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    if done.returncode:
+        _print_lines("Snakemake could not start:", done.stdout.splitlines()[-MOST_LINES:])
+        raise typer.Exit(FAILED)
+    table = done.stdout.partition("Job stats:")[2].partition("\ntotal")[0]
+    rows = re.findall(r"^(\w+) +(\d+)$", table, re.MULTILINE)
+    jobs = sum(int(number) for rule, number in rows if rule not in TARGETS)
+    return f"{format_count(jobs, 'job')} would run." if jobs else "Nothing would run: all results are up to date."
+
+
+def _compute(command: list[str], workflow: Path, campaign, results: Path, targets, cores: int, local: bool) -> bool:
     """Run a command of Snakemake, show its progress and print its outcome; after a failure, exit.
 
     Return True if no job failed, and False if only the verdict did: then all results exist, without the failed runs.
     """
-    from rich.console import Console
+    from icha.planning.plan import find_shortages, needed_for, plan, time_on
 
-    from icha.cli.live import Progress, View
-    from icha.planning.costs import WORKFLOW
-
-    expected = {f"results/{campaign.name}/{item.path}": (item.rule, item.work + WORKFLOW.job) for item in items}
-    progress = Progress(expected)
-    view = View(progress, campaign.name, folder, Console(highlight=False))
-    log = _log_file(folder, campaign.name)
-    status, stopped = _run_snakemake(command, workflow, log, progress, view)
-    _print_outcome(status, stopped, progress, campaign, folder, log)
-    if status and (stopped or {job.rule for job in progress.failed} != {"verdict"}):
+    items = needed_for(targets, plan(campaign, results))
+    for shortage in find_shortages(items, cores, results, local=local):
+        echo(f"Warning: {shortage}", err=True, fg="yellow")
+    progress = Progress(items, results, cores)
+    if progress.expected:
+        expected = f"{formatting.duration(time_on(items, cores))} on {format_count(cores, 'core')}"
+        echo(f"{campaign.name}: {format_count(len(progress.expected), 'file')} to compute, about {expected}")
+    log = results / "logs/snakemake.log"
+    try:
+        log.parent.mkdir(parents=True, exist_ok=True)
+        with log.open("a") as output:
+            begin = output.tell()
+    except OSError as error:
+        raise UserError(
+            f"cannot write to {results}: {error.strerror}; free some space, change its permissions, or use another "
+            "folder: --directory FOLDER"
+        ) from None
+    status, stopped = run_process(command, workflow, log, progress, campaign.name)
+    count = len(progress.finished)
+    if count or status:
+        items = needed_for(targets, plan(campaign, results))
+        missing = sum(item.to_do for item in items)
+        text = f"{format_count(count, 'file')} computed in {formatting.duration(progress.seconds)}"
+        echo(f"{text}, {missing} missing or outdated" if missing else text)
+        _print_early_ends(campaign, results, items)
+    else:
+        echo("Nothing to do: all requested results exist and are up to date.")
+    failed = _print_reasons(results, log, begin, progress, stopped) if status else []
+    files = {"figures": "figures", "dataset": f"dataset/{campaign.name}.nc", "report": "report.html"}
+    for name, file in files.items() if count or not status else ():  # otherwise the files are from an earlier call
+        if (results / file).exists():
+            echo(f"{name + ':':<9}{shorten_path(results / file)}")
+    if status:
+        echo(f"log:     {shorten_path(log)}")
+    if status and (stopped or failed != ["verdict.log"]):
         raise typer.Exit(FAILED)
     return not status
 
 
-# Largest number of times that the seeds of a study are increased to reach its accuracy.
-_MOST_EXTENSIONS = 2
+def _print_reasons(results: Path, log: Path, begin: int, progress: Progress, stopped: bool) -> list[str]:
+    """Print why jobs failed: the last line `Error: …` of each log, or else the end of Snakemake's output.
+
+    Return the names of the logs with errors. In `log`, the output of this call begins at the byte `begin`.
+    """
+    from icha.support.atomic_files import probe_folder
+
+    errors = {}
+    for file in sorted(log.parent.rglob("*.log")):
+        if file != log and file.stat().st_mtime >= progress.called:
+            lines = file.read_text(encoding="utf-8", errors="replace").splitlines()
+            if found := [line for line in lines if line.startswith("Error:")]:
+                errors[file] = found[-1].removeprefix("Error:").strip()
+    if errors:
+        lines = [f"{printable(error)}\n        log: {shorten_path(file)}" for file, error in errors.items()]
+        _print_lines(f"{format_count(len(errors), 'job')} failed:", lines)
+    elif not stopped:
+        heading = "continue" if progress.finished else "start"
+        output = log.read_bytes()[begin:].decode(errors="replace").splitlines()
+        _print_lines(f"Snakemake could not {heading}:", output[-MOST_LINES:])
+    if reason := probe_folder(results):
+        # The logs of the jobs are in the same folder, so the jobs may have been unable to report the error.
+        echo(
+            f"cannot write to {shorten_path(results)}: {reason.strerror}. Solve this problem and repeat the command",
+            fg="red",
+        )
+    if stopped:
+        echo("Stopped before the end. Repeat the command to continue.", fg="red")
+    return [file.name for file in errors]
+
+
+def _print_lines(heading: str, lines: list[str]) -> None:
+    echo(heading, fg="red")
+    for line in lines[:MOST_LINES]:
+        echo(f"    {line}")
+    if len(lines) > MOST_LINES:
+        echo(f"    … and {len(lines) - MOST_LINES} more")
+
+
+def _print_early_ends(campaign, results: Path, items) -> None:
+    """Print the runs that failed, and those that physics ended early; write all reasons to files in `logs`."""
+    from icha.planning.plan import DONE, FAILED, RUNS
+    from icha.planning.results import campaign_files
+
+    cases = campaign_files(campaign).runs
+    kinds = (
+        (FAILED, "failed", "failed_runs.txt", "red"),
+        (DONE, "ended before the last target, as physics decides", "ended_runs.txt", None),
+    )
+    for state, what, name, colour in kinds:
+        reasons = {
+            cases[item.path]: item.reason for item in items if item.part == RUNS and item.state == state and item.reason
+        }
+        if not reasons:
+            continue
+        file = results / "logs" / name
+        file.write_text("".join(f"{case.path}: {reason}\n" for case, reason in reasons.items()), encoding="utf-8")
+        echo(f"{format_count(len(reasons), 'run')} {what}; all reasons: {shorten_path(file)}", fg=colour)
+        _print_contacts(reasons, cases.values())
+
+
+def _print_contacts(reasons, cases) -> None:
+    """Print one line for all seeds of a contact in `reasons`, with the first reason; `cases` are all runs."""
+    from icha.contact.models import DEFAULT_MODEL, MODELS
+
+    requested = Counter(case._replace(seed=0) for case in cases)
+    groups: dict = {}
+    for case in reasons:
+        groups.setdefault(case._replace(seed=0), []).append(case)
+    for contact, failed in itertools.islice(groups.items(), MOST_LINES):
+        seeds = f"{len(failed)} of {requested[contact]} seeds" if requested[contact] > 1 else "1 run"
+        model = "" if contact.model == DEFAULT_MODEL else f", {MODELS[contact.model].words}"
+        place = f"{contact.surface}, slope {contact.rms_slope:g}, {contact.material}{model}"
+        echo(f"  {contact.study}: {seeds} of {place}", bold=True)
+        echo(f"    {reasons[failed[0]]}")
+    if len(groups) > MOST_LINES:
+        echo(f"  … and {len(groups) - MOST_LINES} more groups in the file")
 
 
 def _reach_accuracy(campaign, path: Path, folder: Path, cores: int, compute):
@@ -198,245 +309,6 @@ def _print_accuracy(choices) -> None:
         echo(f"answer:   study {name}: {choice.sentence}{reason}", fg=None if reached else "yellow")
 
 
-def _profile_folder(profile: str | None, workflow: Path) -> Path:
-    """Find the folder of a Snakemake profile by its path or its name; None means the default profile."""
-    for path in (Path(profile or "default"), workflow / "profiles" / (profile or "default")):
-        if (path / "config.yaml").is_file():
-            return path.resolve()
-    names = sorted(path.parent.name for path in (workflow / "profiles").glob("*/config.yaml"))
-    raise UserError(f"--profile {profile}: no folder with a config.yaml; expected a folder, or {', '.join(names)}")
-
-
-def _refuse_if_too_large(items, targets: list[str], cores: int, results: Path, profile: dict) -> None:
-    """Raise `UserError` if memory or disk space is probably too small."""
-    from icha.planning.requirements import find_shortages
-
-    if targets and all(target.startswith("results/") for target in targets):
-        return  # the cost of single files is unknown
-    # Resources on the command line have priority over resources in the profile.
-    resources = [each for each in targets if "=" in each] + profile.get("resources", [])
-    if shortages := find_shortages(items, cores, results, profile | {"resources": resources}):
-        lines = "\n  ".join(["this machine is probably too small:", *shortages])
-        raise UserError(f"{lines}\nNothing was started; use --anyway to start nevertheless")
-
-
-def _dry_run(command: list[str], workflow: Path) -> str:
-    """Plan with Snakemake and run nothing; return how many jobs would run. After an error, print the error and exit."""
-    done = subprocess.run(command, cwd=workflow, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-    if done.returncode == 0:
-        return _planned_jobs(done.stdout)
-    _print_failure("Snakemake could not start:", _reason_in(done.stdout), fg="red")
-    raise typer.Exit(FAILED)
-
-
-def _planned_jobs(output: str) -> str:
-    """Summarise the output of a dry run: the number of jobs of each rule, and the outdated results."""
-    outdated = re.findall(r"^(?:.+, )?to be made again: .+$", output, re.MULTILINE)
-    table = output.partition("Job stats:")[2].partition("\ntotal")[0]
-    rows = re.findall(r"^(\w+) +(\d+)$", table, re.MULTILINE)
-    counts = {rule.replace("_", " "): int(number) for rule, number in rows if rule not in TARGETS}
-    if counts:
-        listed = ", ".join(f"{number} {rule}" for rule, number in counts.items())
-        total = format_count(sum(counts.values()), "job")
-        return "\n".join([*outdated, f"{total} would run, including jobs for outdated results: {listed}"])
-    if outdated:
-        return "\n".join([*outdated, "and all results that depend on these"])
-    return "Nothing would run: all requested results exist and are up to date."
-
-
-def _reason_in(output: str) -> list[str]:
-    """Return why Snakemake stopped without a failed job: the end of its output after the plan, without tracebacks."""
-    lines = [line for line in output.splitlines() if line.strip()]
-    preamble = [number for number, line in enumerate(lines) if re.match(PREAMBLE, line)]
-    lines = lines[preamble[-1] + 1 :] if preamble else lines
-    calls = [number for number, line in enumerate(lines) if line.startswith("Traceback")]
-    if calls:
-        lines = lines[: calls[0]] + [line for line in lines[calls[0] + 1 :] if not line.startswith(" ")]
-    return lines[-MOST_LINES:]
-
-
-def _log_file(folder: Path, campaign: str) -> Path:
-    """Create an empty log file for `icha run` in the folder of Snakemake's own logs."""
-    logs = folder / ".snakemake/log"
-    try:
-        logs.mkdir(parents=True, exist_ok=True)
-        file, name = tempfile.mkstemp(prefix=f"icha-{campaign}-", suffix=".log", dir=logs)
-    except OSError as error:
-        raise UserError(
-            f"cannot write to {folder}: {error.strerror}; free some space, change its permissions, or use another "
-            "folder: --directory FOLDER"
-        ) from None
-    os.close(file)
-    return Path(name)
-
-
-# A signal to stop is repeated after this number of seconds.
-_REPEAT_STOP = 15.0
-
-
-def _run_snakemake(command: list[str], workflow: Path, log: Path, progress, view) -> tuple[int, bool]:
-    """Run Snakemake, update `progress` and `view`; return the exit status, and whether a signal stopped the run."""
-    stopped = []
-    reading, writing = os.pipe()
-    # The plugins of this workflow replace installed plugins of the same name.
-    modules = [str(workflow / "workflow/plugins"), *filter(None, [os.environ.get("PYTHONPATH")])]
-    environment = os.environ | {"ICHA_EVENTS": str(writing), "PYTHONPATH": os.pathsep.join(modules)}
-    if sys.platform == "linux":
-        environment["ICHA_CALLER"] = str(os.getpid())
-    with view.live, log.open("w", encoding="utf-8") as output:
-        # Snakemake gets its own process group, so that Ctrl-C reaches Snakemake and its jobs only once, from `stop`.
-        process = subprocess.Popen(
-            command,
-            cwd=workflow,
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            stdout=output,
-            stderr=subprocess.STDOUT,
-            pass_fds=[writing],
-            process_group=0,
-        )
-        os.close(writing)
-
-        def stop(number, frame):
-            stopped.append(number)
-            view.print("stopping …")
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(process.pid, number)
-
-        # Signals that are already ignored, for example under nohup, remain ignored.
-        signals = [number for number in STOP_SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
-        handlers = {number: signal.signal(number, stop) for number in signals}
-        try:
-            listener = threading.Thread(target=_listen, args=(reading, progress, view, stopped), daemon=True)
-            listener.start()
-            status = None
-            while status is None:
-                with contextlib.suppress(subprocess.TimeoutExpired):
-                    status = process.wait(timeout=_REPEAT_STOP)
-                view.print_running()
-                if status is None and stopped:
-                    # Snakemake can miss a signal that arrives while Snakemake starts a job.
-                    os.killpg(process.pid, stopped[-1])
-            # A process that outlives its job may hold the pipe open.
-            listener.join(timeout=2)
-        finally:
-            for number, handler in handlers.items():
-                signal.signal(number, handler)
-    return status, bool(stopped)
-
-
-def _listen(reading: int, progress, view, stopped: list) -> None:
-    """Read the events of Snakemake, one JSON object per line, and update progress and view until Snakemake ends."""
-    from icha.cli.live import read_error
-
-    with open(reading, encoding="utf-8") as events:
-        for line in events:
-            event = json.loads(line)
-            if event["event"] == "remark":
-                view.print(event["text"], "yellow")
-                continue
-            job = progress.update(event)
-            failed = event["event"] == "job_error"
-            # A job that was stopped has not failed.
-            if job is not None and not (failed and stopped and not read_error(job, view.folder)):
-                view.print_job(job, failed)
-
-
-def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path, log: Path) -> None:
-    """Print the numbers of finished jobs, the reasons for failures, and the paths of results and log."""
-    from icha.support.atomic_files import probe_folder
-
-    results = folder / "results" / campaign.name
-    ended = progress.ended_count
-    if status == 0:
-        log.unlink(missing_ok=True)  # Snakemake has written the same log
-    if status == 0 and progress.started is None:
-        echo("Nothing to do: all requested results exist and are up to date.")
-    elif ended:
-        duration = formatting.duration(progress.clock() - progress.called)
-        echo(f"{len(progress.done)} of {format_count(progress.job_count, 'job')} done in {duration}")
-    _print_failures(status, stopped, progress, campaign, folder, log)
-    if status and results.is_dir() and (reason := probe_folder(results)):
-        # The logs of the jobs are in the same folder, so the jobs may have been unable to report the error.
-        echo(
-            f"cannot write to {shorten_path(results)}: {reason.strerror}. Solve this problem and repeat the command",
-            fg="red",
-        )
-    if stopped or status < 0:
-        echo("Stopped before the end. Repeat the command to continue.", fg="red")
-    elif status and not progress.failed:
-        heading = "Snakemake could not continue:" if ended else "Snakemake could not start:"
-        _print_failure(heading, _reason_in(log.read_text(encoding="utf-8", errors="replace")), fg="red")
-    elif status and progress.job_count > ended:
-        echo(f"{format_count(progress.job_count - ended, 'job')} not run, because they need results of failed jobs")
-    if ended or not status:  # otherwise the files are from an earlier call
-        files = {"figures": "figures", "dataset": f"dataset/{campaign.name}.nc", "report": "report.html"}
-        for name, file in files.items():
-            if (results / file).exists():
-                echo(f"{name + ':':<9}{shorten_path(results / file)}")
-    if status:
-        echo(f"log:     {shorten_path(log)}")
-
-
-def _print_failures(status: int, stopped: bool, progress, campaign, folder: Path, log: Path) -> None:
-    """Print the failed jobs and the failed runs, with the reason for each failure."""
-    from icha.cli.live import read_error
-    from icha.planning.plan import early_ends
-
-    results = folder / "results" / campaign.name
-    incomplete, ended = early_ends(campaign, results)
-    if status or campaign.publication.known_failures:
-        _print_early_ends("failed", incomplete, campaign, results / "logs/failed_runs.txt", "red")
-    what = "ended before the last target, as physics decides"
-    _print_early_ends(what, ended, campaign, results / "logs/ended_runs.txt")
-    incomplete = [case.path for case in incomplete]
-    failed = [job for job in progress.failed if not stopped or read_error(job, folder)]
-    if failed:
-        echo(f"{format_count(len(failed), 'job')} failed:", fg="red")
-        for job in failed:
-            # The message of the job "Verdict on the checks" repeats the failed runs, which are printed above.
-            reason = [line for line in read_error(job, folder) if not any(line.startswith(path) for path in incomplete)]
-            unknown = f"the job ended without a message, perhaps for lack of memory; see {job.log or log}"
-            _print_failure(f"  {job.title}", reason or [unknown], bold=True)
-            if job.log:
-                echo(f"    log: {shorten_path(folder / job.log)}")
-
-
-def _print_early_ends(what: str, reasons: Mapping, campaign, file: Path, colour: str | None = None) -> None:
-    """Print the runs that failed or ended early, one line for all seeds of a contact; write all reasons to a file."""
-    from icha.configuration.cases import run_cases
-    from icha.contact.models import DEFAULT_MODEL, MODELS
-    from icha.datasets.labels import RunLabels
-
-    if not reasons:
-        return
-    file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text("".join(f"{case.path}: {reason}\n" for case, reason in reasons.items()), encoding="utf-8")
-    echo(f"{format_count(len(reasons), 'run')} {what}; all reasons: {shorten_path(file)}", fg=colour)
-    groups: dict[RunLabels, list[RunLabels]] = {}
-    for case in reasons:
-        groups.setdefault(case._replace(seed=0), []).append(case)
-    for contact, cases in itertools.islice(groups.items(), MOST_LINES):
-        asked = sum(each.path == contact.path for each in (case._replace(seed=0) for case in run_cases(campaign)))
-        seeds = f"{len(cases)} of {asked} seeds" if asked > 1 else "1 run"
-        model = "" if contact.model == DEFAULT_MODEL else f", {MODELS[contact.model].words}"
-        echo(
-            f"  {contact.study}: {seeds} of {contact.surface}, slope {contact.rms_slope:g}, {contact.material}{model}",
-            bold=True,
-        )
-        echo(f"    {reasons[cases[0]]}")
-    if len(groups) > MOST_LINES:
-        echo(f"  … and {len(groups) - MOST_LINES} more groups in the file")
-
-
-def _print_failure(heading: str, lines: list[str], **style) -> None:
-    echo(heading, **style)
-    for line in lines[:MOST_LINES]:
-        echo(f"    {line}")
-    if len(lines) > MOST_LINES:
-        echo(f"    … and {len(lines) - MOST_LINES} more lines in the log")
-
-
 def _print_checks(campaign, results: Path) -> None:
     """Print how many checks of the results have passed, and whether the models are applicable to the campaign."""
     import xarray as xr
@@ -462,9 +334,9 @@ def _print_checks(campaign, results: Path) -> None:
         if of_asperities <= measured.keys():
             statements = [each for each in statements if each.about != "accuracy"]
         statements = [*measured.values(), *statements]
-    _print_validity(statements)
+    _print_statements(statements)
 
 
-def _print_validity(statements) -> None:
+def _print_statements(statements) -> None:
     for statement in statements:
         echo(f"{statement.about + ':':<9} {statement.text}", fg=None if statement.good else "yellow")

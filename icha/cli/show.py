@@ -9,9 +9,7 @@ from icha.cli.project import UserError, echo, option
 from icha.datasets.attributes import reasons_not_applicable, why_failed
 from icha.support.formatting import format_count, format_quantity, printable
 
-MOST_ROWS = 12  # largest number of rows in the table of steps
 CURVES = {"contact_area_fraction": "A/A0", "reduced_pressure": "p*", "reduced_separation": "u/h_rms"}
-COLUMNS = ("reduced_pressure", "contact_area_fraction", "reduced_separation", "spot_count")
 
 
 def show(
@@ -60,8 +58,7 @@ def _print_table(kind: str, data, file: Path, parquet: Path | None) -> None:
 
 
 def _print_run(run, file: Path) -> None:
-    """Print the model, material and surface of a run, and its results."""
-    import numpy as np
+    """Print the model, material and surface of a run, and the ranges of its results."""
 
     def quantity(name, unit):
         return format_quantity(float(run[name]), unit)
@@ -103,17 +100,6 @@ def _print_run(run, file: Path) -> None:
         echo(f"pull-off: {tension} of tension; loss {float(run['hysteresis_loss']):.3g} J/m²")
     if "pull_off_force" in run:
         echo(f"          {_indenter_test(run)}")
-    shown = np.unique(np.linspace(0, steps - 1, min(steps, MOST_ROWS)).round().astype(int))
-    if "force" in run:
-        echo("\n  step      force, N   indentation, m   contact radius, m")
-        for k in shown:
-            force, indentation, radius = (float(run[name][k]) for name in ("force", "indentation", "contact_radius"))
-            echo(f"{k:>6}  {force:>12.4e}   {indentation:>14.4e}   {radius:>17.4e}")
-        return
-    echo("\n  step      p/(E* h'rms)   A/A0         u/h_rms    spots")
-    for k in shown:
-        pressure, area, separation, spots = (float(run[name][k]) for name in COLUMNS)
-        echo(f"{k:>6}  {pressure:>16.4e}   {area:.4e}   {separation:>8.4f}   {spots:>6.0f}")
 
 
 def _indenter_test(run) -> str:
@@ -141,7 +127,6 @@ def _print_surface(surface, file: Path) -> None:
     for key in ("summary", "boundary", "shape", "source_file", "preparation"):
         if key in surface.attrs:
             echo(f"{key.replace('_', ' ')}: {printable(surface.attrs[key])}")
-    echo("")
     scale = measured_scale(surface)
     if scale != 1:
         height, slope = (float(surface[name]) * scale for name in ("rms_height", "rms_slope"))
@@ -152,17 +137,13 @@ def _print_surface(surface, file: Path) -> None:
             unit = variable.attrs.get("units", "1").removeprefix("1")
             text = format_quantity(float(variable), "m") if unit == "m" else f"{float(variable):.5g} {unit}".rstrip()
             echo(printable(f"{variable.attrs.get('long_name', name)}: {text}"))
-    heights = surface["height"].values
-    low, high = (format_quantity(float(height) * scale, "m") for height in (heights.min(), heights.max()))
-    echo(f"heights from {low} to {high}, as {'stored' if scale == 1 else 'measured'}")
 
 
 def _print_campaign(tree, file: Path) -> None:
-    """Print, for each study of a campaign, its size, models, ranges of results and failed runs."""
+    """Print, for each study of a campaign, its size, models, number of failed runs and ranges of results."""
     from icha.analysis.left_out import left_out_of_study
-    from icha.datasets.campaign import run_place, runs_of_status
-    from icha.datasets.labels import LABELS, labels_at
-    from icha.datasets.variables.campaign import BEYOND_MODEL, LOADED_RUNS
+    from icha.datasets.labels import LABELS
+    from icha.datasets.variables.campaign import LOADED_RUNS
 
     echo(f"{file}: {printable(tree.attrs.get('title', 'campaign'))}")
     echo(printable(" ".join(str(tree.attrs.get("summary", "")).split())))
@@ -182,19 +163,6 @@ def _print_campaign(tree, file: Path) -> None:
             values = results[variable].values
             if (known := values[values == values]).size:
                 echo(f"  {label:<6} {known.min():.3g} to {known.max():.3g}")
-        if "pull_off_force" in study:
-            for labels in runs_of_status(study, name, LOADED_RUNS):
-                run = study.isel(run_place(study, labels))
-                if run["pull_off_force"].notnull():
-                    known = run[[each for each in run if run[each].ndim == 0 and run[each].notnull()]]
-                    echo(f"  {printable(labels.path.partition('/')[2])}: {_indenter_test(known)}")
         if reasons := reasons_not_applicable(study):
             first = printable(". ".join(list(reasons)[:3]))
             echo(f"  model not applicable to {format_count(reasons.total(), 'run')}: {first}", fg="red")
-        if "failure" in study:
-            failure = study["failure"].transpose(*LABELS).values
-            # A run that reaches the limit of its model has not failed: the loading up to the limit is a result.
-            failed = study["status"].transpose(*LABELS).values != BEYOND_MODEL
-            for index in zip(*((failure != "") & failed).nonzero(), strict=True):
-                labels = ", ".join(map(str, labels_at(study, index, LABELS)))
-                echo(f"  failed: {printable(labels)}: {printable(failure[index])}", fg="red")

@@ -1,5 +1,6 @@
 """Plan of a campaign: files to compute, states of the files, and expected costs of the jobs."""
 
+import itertools
 import os
 import shutil
 from collections.abc import Callable, Iterable, Iterator
@@ -10,7 +11,6 @@ from icha.configuration.campaign import Campaign
 from icha.configuration.cases import campaign_sha256
 from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets.attributes import why_failed
-from icha.datasets.labels import RunLabels
 from icha.datasets.stamp import difference, read_stamp
 from icha.datasets.variables.campaign import STATUS_ATTRIBUTES
 from icha.figures.registry import declaration_of
@@ -24,14 +24,15 @@ from icha.support.formatting import format_count
 DONE, TO_DO, OUTDATED, FAILED = "done", "to do", "outdated", "failed"
 # Memory in bytes that Snakemake lets parallel jobs use together (profiles/default/config.yaml).
 _MOST_MEMORY = 14e9
-# Parts of a campaign that each target of the workflow needs; other targets need all parts.
-SURFACES, RUNS, THEORIES, ANALYSIS, FIGURES, REPORT = "surfaces", "runs", "theories", "analysis", "figures", "report"
+# Parts of a campaign, named as the targets of the workflow, and the parts that these targets need.
+SURFACES, RUNS, THEORIES = "surfaces", "runs", "references"
+ANALYSIS, FIGURES, REPORT = "dataset", "figures", "report"
 _NEEDED = {
-    "surfaces": {SURFACES},
-    "runs": {SURFACES, RUNS},
-    "references": {SURFACES, THEORIES},
-    "dataset": {SURFACES, RUNS, ANALYSIS},
-    "figures": {SURFACES, RUNS, THEORIES, ANALYSIS, FIGURES},
+    SURFACES: {SURFACES},
+    RUNS: {SURFACES, RUNS},
+    THEORIES: {SURFACES, THEORIES},
+    ANALYSIS: {SURFACES, RUNS, ANALYSIS},
+    FIGURES: {SURFACES, RUNS, THEORIES, ANALYSIS, FIGURES},
 }
 
 
@@ -72,11 +73,17 @@ class Item:
 
 
 def needed_for(targets: Iterable[str], items: Iterable[Item]) -> list[Item]:
-    """Return the items that targets of the workflow need; without targets, all items."""
-    parts = [_NEEDED.get(target) for target in targets]
-    if not parts or None in parts:
-        return list(items)
-    return [item for item in items if item.part in set().union(*parts)]
+    """Return the items that targets of the workflow need.
+
+    Without targets, and for the targets `all`, `report` and `publish`, these are all items. For a file, it is the file.
+    Options of Snakemake, which begin with a minus, end the targets.
+    """
+    names = list(itertools.takewhile(lambda target: not target.startswith("-"), targets)) or ["all"]
+
+    def is_needed(item, name):
+        return name.endswith(item.path) if "/" in name else item.part in _NEEDED.get(name, {item.part})
+
+    return [item for item in items if any(is_needed(item, name) for name in names)]
 
 
 def plan(campaign: Campaign, results: Path) -> list[Item]:
@@ -89,13 +96,13 @@ def plan(campaign: Campaign, results: Path) -> list[Item]:
     state_of = _states(campaign, results)
     for path, (name, _) in files.surfaces.items():
         cost, threads = costs.surface_cost(campaign.grid(name)), surface_threads(campaign, name)
-        items.append(Item(SURFACES, SURFACES, path, *state_of(path), cost, threads))
+        items.append(Item(SURFACES, "surfaces", path, *state_of(path), cost, threads))
     for path, case in files.runs.items():
         group = f"study {case.study}" + (f", {MODELS[case.model].words}" if case.model != DEFAULT_MODEL else "")
         items.append(Item(RUNS, group, path, *state_of(path), cost_of_run[case], run_threads(campaign, case)))
     analysis = list(_analysis(campaign, results, items))
     items += [
-        Item(THEORIES, THEORIES, path, *state_of(path), costs.analysis_cost(35e3, 0.0)) for path in files.theories
+        Item(THEORIES, "theories", path, *state_of(path), costs.analysis_cost(35e3, 0.0)) for path in files.theories
     ]
     return items + analysis
 
@@ -128,7 +135,7 @@ def _analysis(campaign: Campaign, results: Path, computed: list[Item]) -> Iterat
 
     def item(part, path, cost):
         state = DONE if not outdated and (results / path).is_file() else TO_DO
-        return Item(part, part, path, state, "", cost)
+        return Item(part, "dataset and checks" if part == ANALYSIS else part, path, state, "", cost)
 
     sizes = {files.dataset: 0.5 * disk, files.table: 0.1 * disk, files.comparison: 0.03 * disk + 90e3}
     others = (*files.model_error, *files.answers, *files.sensitivity, files.checks)
@@ -144,14 +151,6 @@ def _analysis(campaign: Campaign, results: Path, computed: list[Item]) -> Iterat
 def _contains_runs(dataset: Path, campaign: Campaign) -> bool:
     """Return whether a campaign dataset exists and contains the runs of the campaign; some may have been removed."""
     return dataset.is_file() and (read_stamp(dataset) or {}).get("config_sha256") == campaign_sha256(campaign)
-
-
-def early_ends(campaign: Campaign, results: Path) -> tuple[dict[RunLabels, str], dict[RunLabels, str]]:
-    """Return the reasons of runs that failed, and of runs that physics ended early, with the present settings."""
-    state_of, cases = _states(campaign, results), campaign_files(campaign).runs
-    states = {case: state_of(path) for path, case in cases.items()}
-    failed = {case: reason for case, (state, reason) in states.items() if state == FAILED}
-    return failed, {case: reason for case, (state, reason) in states.items() if state == DONE and reason}
 
 
 def whole_cost(campaign: Campaign, results: Path) -> costs.Cost:

@@ -1,11 +1,14 @@
 """The command line without Snakemake: what it prints, what it writes, what it refuses."""
 
 import json
+import os
 import re
 import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import netCDF4
@@ -20,17 +23,18 @@ from typer.testing import CliRunner
 
 from icha.analysis.checks import check_campaign, write_checks
 from icha.cli import app
-from icha.cli.live import Progress, View, read_error, read_last_line
+from icha.cli.progress import Progress
 from icha.cli.project import list_campaigns, reports_errors
-from icha.configuration.cases import campaign_sha256, run_cases, run_sha256
+from icha.configuration.cases import campaign_sha256, run_cases
 from icha.configuration.load import load_configuration
 from icha.datasets.campaign_file import write_campaign
 from icha.datasets.files import read_dataset, write_dataset
 from icha.datasets.surface_file import write_surface
+from icha.planning.costs import Cost
 from icha.planning.ownership import claim, find_conflict
-from icha.planning.plan import CHANGED, DAMAGED, DONE, FAILED, TO_DO, early_ends, plan, time_on
+from icha.planning.plan import DONE, FAILED, OUTDATED, TO_DO, Item, plan, time_on
+from icha.planning.results import campaign_files, expected_stamps
 from icha.references.theories import reference_dataset
-from icha.support.checksums import damaged, write_checksum
 from icha.support.formatting import format_quantity
 from icha.surfaces.shapes import Sphere
 from icha.surfaces.spectrum import SelfAffineSpectrum
@@ -79,12 +83,12 @@ def no_snakemake(monkeypatch):
         raise SystemExit(STARTED)
 
     # In the package, `run` is the command.
-    monkeypatch.setattr(sys.modules["icha.cli.run"], "_run_snakemake", start)
+    monkeypatch.setattr(sys.modules["icha.cli.run"], "run_process", start)
 
 
 @pytest.fixture
 def small_machine(monkeypatch, no_snakemake):
-    monkeypatch.setattr("icha.planning.requirements.memory_of_machine", lambda: 2**20)
+    monkeypatch.setattr("icha.planning.plan.memory_of_machine", lambda: 2**20)
 
 
 @pytest.fixture
@@ -379,50 +383,42 @@ def test_outside_a_clone_the_installed_workflow_is_used(empty_folder):
     assert "configuration: config/config.yaml" in output("describe")
 
 
+def write_results(campaign, results, paths, **attrs):
+    """Write a run with the expected stamp, changed by `attrs`, to each path."""
+    stamps = expected_stamps(campaign)
+    for path in paths:
+        (results / path).parent.mkdir(parents=True, exist_ok=True)
+        write_dataset(small.run().assign_attrs(stamps[path] | attrs), results / path)
+
+
+def states(campaign, results):
+    return {item.path: item.state for item in plan(campaign, results)}
+
+
 def test_the_states_of_runs_are_distinguished(tiny):
     campaign, results = tiny
-    done, changed, failed, missing = run_cases(campaign)
-    reason = "the path ends early"
-    for case, attrs in (
-        (done, {"config_sha256": run_sha256(campaign, done)}),
-        (changed, {"config_sha256": "0" * 64}),
-        (failed, {"config_sha256": run_sha256(campaign, failed), "incomplete": reason}),
-    ):
-        (results / f"runs/{case.path}.nc").parent.mkdir(parents=True, exist_ok=True)
-        write_dataset(small.run().assign_attrs(attrs), results / f"runs/{case.path}.nc")
-    states = {item.path: item.state for item in plan(campaign, results)}
-    for case, state in ((done, DONE), (changed, CHANGED), (failed, FAILED), (missing, TO_DO)):
-        assert states[f"runs/{case.path}.nc"] == state
-    assert early_ends(campaign, results) == ({failed: reason}, {})
+    paths = done, changed, edited, failed = list(campaign_files(campaign).runs)
+    write_results(campaign, results, [done])
+    write_results(campaign, results, [changed], config_sha256="0" * 64)
+    write_results(campaign, results, [edited], program_sha256="0" * 64)
+    write_results(campaign, results, [failed], incomplete="the path ends early")
+    found = states(campaign, results)
+    assert [found[path] for path in paths] == [DONE, OUTDATED, OUTDATED, FAILED]
+    assert found["surfaces/rough/seed1.nc"] == TO_DO
     described = printed("describe", "tiny.yaml", "--runs")
-    assert "4 runs, 2 to do" in described and "1 run made with other settings" in described
-    assert f"failed: runs/{failed.path}.nc: {reason}" in described
-
-
-def test_all_campaigns_are_listed_with_their_states(tiny):
-    campaign, results = tiny
-    done, *_ = run_cases(campaign)
-    (results / f"runs/{done.path}.nc").parent.mkdir(parents=True, exist_ok=True)
-    write_dataset(small.run().assign_attrs(config_sha256=run_sha256(campaign, done)), results / f"runs/{done.path}.nc")
-    Path("config/campaigns").mkdir(parents=True, exist_ok=True)
-    Path("config/campaigns/tiny.yaml").write_text(TINY, encoding="utf-8")
-    Path("config/campaigns/wrong.yaml").write_text("name: wrong\n", encoding="utf-8")
-    listed = output("list")
-    (row,) = (line for line in listed.splitlines() if line.startswith("tiny "))
-    assert row.split()[:3] == ["tiny", "4", "1"] and row.rstrip().endswith("tiny.yaml")
-    assert any(line.startswith("paper ") for line in listed.splitlines())
-    assert "cannot be read: " in listed and "wrong.yaml: title: the key is missing" in listed
+    assert "4 runs, 2 to do" in described and f"failed: {failed}: the path ends early" in described
+    for reason in ("with other settings", "by another version of the program"):
+        assert f"outdated: 1 file, because it was computed {reason}: will be computed again" in described
 
 
 def test_a_dataset_with_runs_that_are_no_longer_in_the_campaign_is_computed_again(tiny):
     campaign, results = tiny
-    for case in run_cases(campaign):
-        (results / f"runs/{case.path}.nc").parent.mkdir(parents=True, exist_ok=True)
-        attrs = {"config_sha256": run_sha256(campaign, case)}
-        write_dataset(small.run().assign_attrs(attrs), results / f"runs/{case.path}.nc")
-    for sha256, state in ((campaign_sha256(campaign), DONE), ("0" * 64, CHANGED)):
-        write_campaign(small.runs(), results / "dataset/tiny.nc", attrs={"config_sha256": sha256})
-        assert {item.path: item.state for item in plan(campaign, results)}["dataset/tiny.nc"] == state
+    files = campaign_files(campaign)
+    write_results(campaign, results, [*files.surfaces, *files.runs])
+    for sha256, state in ((campaign_sha256(campaign), DONE), ("0" * 64, TO_DO)):
+        write_campaign(small.runs(), results / files.dataset, attrs={"config_sha256": sha256})
+        assert states(campaign, results)[files.dataset] == state
+    assert states(campaign, results)[files.checks] == TO_DO
 
 
 def test_results_of_another_file_of_the_same_name_are_not_changed(tiny, no_snakemake):
@@ -448,17 +444,17 @@ def test_the_configuration_as_used_belongs_to_its_results(project):
     results = project / "results/tiny"
     results.mkdir(parents=True)
     (results / "config.used.yaml").write_text(TINY)
-    claim(results, results / "config.used.yaml", project)
+    claim(results, results / "config.used.yaml")
     assert not (results / "belongs_to.txt").exists()
-    claim(results, project / "tiny.yaml", project)
-    claim(results, project / "copy.yaml", project)
+    claim(results, project / "tiny.yaml")
+    claim(results, project / "copy.yaml")
     assert (results / "belongs_to.txt").read_text() == "tiny.yaml\n"
-    assert find_conflict(results, "tiny", results / "config.used.yaml", project) is None
-    assert find_conflict(results, "tiny", project / "config/../tiny.yaml", project) is None
+    assert find_conflict(results, results / "config.used.yaml") is None
+    assert find_conflict(results, project / "config/../tiny.yaml") is None
 
 
 def test_validity_of_the_models_is_printed_before_a_run(tiny, small_machine):
-    for text in (output("describe", "tiny.yaml"), output("run", "tiny.yaml", "--anyway", status=STARTED)):
+    for text in (output("describe", "tiny.yaml"), output("run", "tiny.yaml", status=STARTED)):
         assert all(f"{word}: " in text for word in ("models", "jump-in", "adhesion", "accuracy"))
 
 
@@ -473,37 +469,23 @@ def test_checks_and_validity_are_printed_separately_after_a_run(tiny, capsys):
     assert "asperities in slopes, single" in statements[0]
 
 
-def test_truncated_files_are_damaged_and_computed_again(tiny):
+def test_truncated_files_are_computed_again(tiny):
     campaign, results = tiny
-    whole, cut, *_ = (f"runs/{case.path}.nc" for case in run_cases(campaign))
-    sha256 = run_sha256(campaign, run_cases(campaign)[0])
-    empty = ["surfaces/rough/seed2.nc", "references/rough.nc", "dataset/tiny.nc", "aggregated/tiny.nc"]
-    for path in (whole, cut, *empty):
-        (results / path).parent.mkdir(parents=True, exist_ok=True)
-        write_dataset(small.run().assign_attrs(config_sha256=sha256), results / path)
-        write_checksum(results, path)
-    assert damaged(results) == []
+    whole, cut, empty, _ = campaign_files(campaign).runs
+    write_results(campaign, results, [whole, cut, empty])
     (results / cut).write_bytes((results / cut).read_bytes()[:-100])
-    for path in empty:
-        (results / path).write_bytes(b"")
-    assert set(damaged(results)) == {cut, *empty}
-    states = {item.path: item.state for item in plan(campaign, results)}
-    assert states[whole] == DONE and states[cut] == DAMAGED and states["surfaces/rough/seed2.nc"] == DAMAGED
-    described = printed("describe", "tiny.yaml")
-    assert "other settings" not in described
-    for path in (cut, *empty):
-        assert f"damaged: {path}: will be computed again" in described
+    (results / empty).write_bytes(b"")
+    found = states(campaign, results)
+    assert [found[path] for path in (whole, cut, empty)] == [DONE, OUTDATED, OUTDATED]
+    assert "outdated: 2 files, because it cannot be read: will be computed again" in printed("describe", "tiny.yaml")
 
 
-def test_a_campaign_too_large_for_the_machine_is_refused_without_a_terminal(tiny, small_machine):
-    refused = printed("run", "tiny.yaml", status=2)
-    assert "this machine has 1.05 MB" in refused and "--anyway" in refused
-    assert "too small: jobs on 2 cores need about" in output("describe", "tiny.yaml")
-    output("run", "tiny.yaml", "all", "--", "--forceall", "--resources", "mem_mb=60000", status=2)
-    output("run", "tiny.yaml", "--profile", "default", status=2)
+def test_a_campaign_too_large_for_the_machine_causes_a_warning(tiny, small_machine):
+    assert "Warning: jobs on 2 cores need about" in printed("run", "tiny.yaml", status=STARTED)
+    described = output("describe", "tiny.yaml")
+    assert "too small: jobs on 2 cores need about" in described and "this machine has 1.05 MB" in described
     # A cluster does not use the memory of this machine.
-    for arguments in (["results/tiny/report.html"], ["--anyway"], ["--profile", "slurm"]):
-        output("run", "tiny.yaml", *arguments, status=STARTED)
+    assert "Warning" not in output("run", "tiny.yaml", "--profile", "slurm", status=STARTED)
 
 
 def test_memory_that_the_system_refuses_is_a_message():
@@ -522,7 +504,7 @@ def test_all_files_are_checked_and_runs_are_shown(empty_folder):
     write_dataset(run.assign_attrs(incomplete="the path ends early"), "failed.nc")
     Path("bad.npy").write_bytes(b"")
     assert "run dataset, no problems" in output("check", "run.nc")
-    assert "1.0000e-02" in output("show", "run.nc")
+    assert "p* " in output("show", "run.nc")
     assert "failed:   the path ends early" in output("show", "failed.nc")
     assert "failed.nc: run dataset, 1 problem" in output("check", "run.nc", "failed.nc", status=1)
     checked = output("check", "bad.npy", "none.nc", "failed.nc", "run.nc", status=2)
@@ -553,7 +535,7 @@ def test_scans_are_shown_as_measured(empty_folder):
     write_dataset(surface.assign(measured_rms_slope=surface["rms_slope"] * 1e-3), "scan.nc")
     height = format_quantity(1e-3 * float(surface["rms_height"]), "m")
     assert f"as measured: rms height {height}, rms slope 0.001" in printed("show", "scan.nc")
-    assert ", as stored" in printed("show", "surface.nc")
+    assert "as measured" not in printed("show", "surface.nc")
 
 
 def test_results_without_checks_are_named(empty_folder):
@@ -564,91 +546,47 @@ def test_results_without_checks_are_named(empty_folder):
     assert "deposit: is a folder" in printed("check", "deposit", status=2)
 
 
-class Clock:
-    now = 0.0
-
-    def __call__(self):
-        return self.now
-
-
-def started(number, rule="run", log=()):
-    event = {"event": "job_info", "jobid": number, "rule_name": rule, "rule_msg": f"Sweep {number}"}
-    return event | {"output": [f"results/tiny/runs/{number}.nc"], "log": log}
+@pytest.fixture
+def clock(monkeypatch):
+    """Clock of the progress."""
+    clock = SimpleNamespace(now=0.0, monotonic=lambda: clock.now, time=time.time)
+    monkeypatch.setattr("icha.cli.progress.time", clock)
+    return clock
 
 
 @pytest.fixture
-def progress():
-    progress = Progress({f"results/tiny/runs/{k}.nc": ("run", 10.0) for k in range(4)}, Clock())
-    progress.update({"event": "resources_info", "cores": 2})
-    progress.update({"event": "run_info", "stats": {"run": 4, "all": 1, "total": 5}})
-    return progress
+def progress(tmp_path, clock):
+    """Progress of four files of 10 s on two cores, of which one exists."""
+    items = [Item("runs", "study", f"{k}.nc", TO_DO if k else DONE, "", Cost(10.0, 0, 0)) for k in range(4)]
+    (tmp_path / "0.nc").touch()
+    return Progress(items, tmp_path, 2)
 
 
-def test_events_are_counted_by_rule(progress):
-    assert progress.job_count == 4  # not `all`, which computes nothing
-    for number in (0, 1, 2):
-        progress.update(started(number))
-    progress.update(started(9, rule="all"))
-    assert progress.update({"event": "job_finished", "job_id": 0}).title == "Sweep 0"
-    assert progress.update({"event": "job_error", "jobid": 1}).rule == "run"
-    assert progress.ended_count == 2 and progress.total == {"run": 4} and len(progress.running) == 1
-    assert progress.update({"event": "job_finished", "job_id": 9}) is None
+def test_finished_files_are_counted(progress, tmp_path):
+    assert (progress.count(), progress.total) == (0, 3)
+    (tmp_path / "1.nc").touch()
+    (tmp_path / "0.nc").write_text("made again, because a figure has changed")
+    os.utime(tmp_path / "0.nc", (1, 1))
+    assert (progress.count(), progress.total) == (2, 4)
 
 
-def test_time_left_follows_the_times_of_jobs(progress):
-    assert progress.seconds_left() == pytest.approx(4 * 10 / 2)
-    progress.update(started(0))
-    progress.update(started(1))
-    progress.clock.now = 30.0
-    progress.update({"event": "job_finished", "job_id": 0})
-    progress.update({"event": "job_finished", "job_id": 1})
-    # Two jobs of 10 s took 30 s each: the other two are expected to take about three times as long.
-    assert 2 * 10 * 2 / 2 < progress.seconds_left() <= 2 * 10 * 3 / 2
-    progress.update(started(2))
-    before = progress.seconds_left()
-    progress.clock.now += 5
-    assert progress.seconds_left() == pytest.approx(before - 5 / 2)
+def test_time_left_follows_the_times_of_files(progress, tmp_path, clock):
+    def left():
+        return float(re.fullmatch(r"about (\S+) s left", progress.time_left())[1])
 
-
-def test_the_live_view_shows_jobs_and_the_last_lines_of_their_logs(progress, tmp_path):
-    from rich.console import Console
-
-    (tmp_path / "0.log").write_text("stop 1 of 2\nstop 2 of 2: A/A0 3e-2\nhalf a li")
-    progress.update(started(0, log=["0.log (check log file(s) for error details)"]))
-    progress.clock.now = 65
-    console = Console(width=100, record=True, force_terminal=True, color_system=None)
-    view = View(progress, "tiny", tmp_path, console)
-    console.print(view._draw())
-    # Only failed jobs are printed above the table.
-    job = progress.update({"event": "job_error", "jobid": 0})
-    view.print_job(job, failed=False)
-    view.print_job(job, failed=True)
-    text = console.export_text()
-    assert text.count("[1/4, about ") == 1 and "failed: Sweep 0 (1.1 min)" in text
-    assert "tiny: 0 of 4 jobs" in text and "1.1 min  Sweep 0" in text and "stop 2 of 2: A/A0 3e-2" in text
-    assert "half a li" not in text
-
-
-def test_without_a_terminal_running_jobs_are_printed_once_a_minute(progress, tmp_path):
-    from rich.console import Console
-
-    (tmp_path / "0.log").write_text("stop 1 of 2\n")
-    progress.update(started(0, log=["0.log"]))
-    console = Console(width=100, record=True)
-    view = View(progress, "tiny", tmp_path, console)
-    for now in range(0, 180, 15):  # as often as the run looks whether Snakemake has ended
-        progress.clock.now = now
-        view.print_running()
-    text = console.export_text()
-    assert text.count("tiny: 0 of 4 jobs") == text.count("Sweep 0") == text.count("stop 1 of 2") == 3
-
-
-def test_reasons_of_failures_are_in_logs(progress, tmp_path):
-    progress.update(started(0, log=["0.log"]))
-    job = progress.update({"event": "job_error", "jobid": 0})
-    assert read_error(job, tmp_path) == [] and read_last_line(job, tmp_path) == ""
-    (tmp_path / "0.log").write_text("stop 1 of 2\nError: 2 checks failed\nthis one\nthat one\n")
-    assert read_error(job, tmp_path) == ["2 checks failed", "this one", "that one"]
+    start = left()
+    assert start >= 3 * 10 / 2
+    for k in (1, 2):
+        clock.now += 30.0
+        (tmp_path / f"{k}.nc").touch()
+        progress.count()
+    # A file of 10 s took 30 s on two cores: the last one is expected to take about as long.
+    assert start / 3 < left() < 60
+    before = left()
+    clock.now += 5
+    assert left() == pytest.approx(before - 5, abs=1)
+    clock.now += 1000
+    assert progress.time_left() == "longer than expected"
 
 
 def test_a_new_campaign_of_a_scan_names_the_key_for_its_defect(project):

@@ -4,7 +4,7 @@ import pytest
 
 from icha.configuration.cases import run_cases, run_settings, run_sha256
 from icha.configuration.errors import ConfigurationError
-from icha.planning.plan import plan
+from icha.planning.plan import RUNS, plan
 from icha.planning.requirements import run_memory, run_minutes
 from icha.planning.results import campaign_files
 
@@ -42,8 +42,8 @@ def test_other_models_have_a_folder_of_their_own(load):
 
 def test_boundary_elements_are_planned_as_a_part_of_their_own_at_their_own_cost(load, tmp_path):
     campaign = load(BOTH | {"surfaces.rough.grid": 512}).campaign
-    runs = [item for item in plan(campaign, tmp_path) if item.is_run]
-    assert [item.part for item in runs] == 4 * ["study one"] + 4 * ["study one, boundary elements"]
+    runs = [item for item in plan(campaign, tmp_path) if item.part == RUNS]
+    assert [item.group for item in runs] == 4 * ["study one"] + 4 * ["study one, boundary elements"]
     quick, slow = runs[:4], runs[4:]
     assert min(item.cost.seconds for item in slow) > 2 * max(item.cost.seconds for item in quick)
     first, *_, last = run_cases(campaign)

@@ -131,7 +131,6 @@ INSTALLED = {
     "icha/physics.py": "ONE = 1\n",
     "icha_workflow/Snakefile": "rule all:\n",
     "icha_workflow/uv.lock": "version = 1\n",
-    "snakemake_logger_plugin_icha/__init__.py": "",
 }
 
 

@@ -105,8 +105,8 @@ def computed(monkeypatch, tmp_path):
     """Stand in for `icha run`: make the files that are asked for, and note how it was called."""
     calls = []
 
-    def run(configuration, targets, *, cores, folder, anyway):
-        calls.append((configuration, targets, cores, anyway))
+    def run(configuration, targets, *, cores, folder):
+        calls.append((configuration, targets, cores))
         results = folder / "results/tiny"
         asked = [each.removeprefix("results/tiny/") for each in targets if each != "all"]
         for path in asked or RUNS:
@@ -128,11 +128,11 @@ def computed(monkeypatch, tmp_path):
 def test_what_is_the_same_is_identical_and_leaves_nothing_behind(ending, deposit, reproduce, computed, tmp_path):
     folder = deposit()
     before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
-    status, output = reproduce(folder.with_name(folder.name + ending), "--cores", "3", "--anyway")
+    status, output = reproduce(folder.with_name(folder.name + ending), "--cores", "3")
     assert status == 0 and "identical: every value in 4 files" in output, output
     assert f"program:    the installed ICHA {version('icha')}; nothing in the deposit is executed" in output
-    ((_, targets, cores, anyway),) = computed
-    assert (targets, cores, anyway) == (["all"], 3, True)
+    ((_, targets, cores),) = computed
+    assert (targets, cores) == (["all"], 3)
     assert list((tmp_path / "temporary").iterdir()) == []
     assert {path: path.stat().st_mtime_ns for path in folder.rglob("*")} == before
 

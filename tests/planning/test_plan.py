@@ -6,9 +6,9 @@ import yaml
 from conftest import REPOSITORY
 
 from icha.configuration.load import load_configuration
-from icha.planning import requirements
-from icha.planning.costs import WORKFLOW, Cost
-from icha.planning.plan import DONE, TO_DO, Item, memory_on, plan, start_up, time_on
+from icha.planning.costs import JOB, START, WORKFLOW_MEMORY, Cost
+from icha.planning.plan import ANALYSIS, DONE, RUNS, TO_DO, Item, find_shortages, memory_on, needed_for, plan, time_on
+from icha.planning.requirements import is_resumable, run_threads
 from icha.planning.results import campaign_files
 from icha.planning.validity import surface_facts
 from icha.surfaces.measured.topography import prepared_topography
@@ -55,7 +55,7 @@ def test_tensile_targets_have_a_cost(tmp_path):
     (tmp_path / "scanned.yaml").write_text(text)
     np.save(tmp_path / "scan.npy", np.random.default_rng(1).normal(size=(40, 40)))
     items = plan(load_configuration(tmp_path / "scanned.yaml").campaign, tmp_path)
-    assert all(item.cost.seconds > 0 for item in items if item.is_run)
+    assert all(item.cost.seconds > 0 for item in items if item.part == RUNS)
 
 
 def test_the_summits_of_a_measured_surface_are_counted_in_its_file(campaign):
@@ -73,59 +73,62 @@ def test_every_file_that_costs_something_is_planned(campaign, tmp_path):
     assert planned == {path for path in files.computed if not path.endswith((".pdf", ".txt"))}
 
 
-def test_files_derived_from_new_files_are_made_again(campaign, tmp_path):
-    files = campaign_files(campaign)
-    for path in (*files.surfaces, files.dataset, files.comparison, files.checks, *files.figures, files.report):
-        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / path).write_text("made of other runs")
-    states = {item.path: item.state for item in plan(campaign, tmp_path)}
-    assert all(states[path] == DONE for path in files.surfaces)
-    assert all(states[path] == TO_DO for path in (*files.runs, files.dataset, files.checks, files.report))
-    assert states[files.figures[0]] == TO_DO
+def test_targets_need_a_part_of_the_files(campaign, tmp_path):
+    items, files = plan(campaign, tmp_path), campaign_files(campaign)
+    assert {item.path for item in needed_for(["runs", "--forceall"], items)} == {*files.surfaces, *files.runs}
+    assert files.dataset in {item.path for item in needed_for(["dataset"], items)}
+    assert [item.path for item in needed_for([f"results/scanned/{files.report}"], items)] == [files.report]
+    assert needed_for([], items) == needed_for(["--forceall"], items) == needed_for(["runs", "all"], items) == items
 
 
-def item(name, seconds=1.0, memory=1 * GB, stage=0, state=TO_DO, threads=1):
-    return Item("part", "run", name, state, Cost(seconds, memory, 5 * GB), threads, stage=stage)
+def item(name, seconds=1.0, memory=1 * GB, state=TO_DO, threads=1, part=ANALYSIS):
+    return Item(part, part, name, state, "", Cost(seconds, memory, 5 * GB), threads)
 
 
-def test_time_is_that_of_the_start_and_of_one_stage_after_the_other():
-    jobs = [item("a", 10), item("b", 2), item("c", 4, stage=1)]
-    start, job = start_up(jobs), WORKFLOW.job
-    assert start > WORKFLOW.start
-    assert time_on(jobs, 1) == pytest.approx(start + 16 + 3 * job)
-    assert time_on(jobs, 10**6) == pytest.approx(start + 10 + 4)
+def test_time_is_that_of_the_start_and_of_the_work_or_the_longest_job():
+    jobs = [item("a", 10), item("b", 2), item("c", 4)]
+    assert time_on(jobs, 1) == pytest.approx(START + 16 + 3 * JOB)
+    assert time_on(jobs, 10**6) == pytest.approx(START + 10)
     assert time_on([item("a", state=DONE)], 1) == 0
+    # Short runs share the start of a job.
+    assert item("a", 1, part=RUNS).work < item("a", 1).work == pytest.approx(1 + JOB)
 
 
 def test_memory_is_that_of_parallel_jobs_and_of_snakemake():
     jobs = [item("a", memory=3 * GB), item("b", memory=2 * GB), item("c", memory=1 * GB)]
-    around = WORKFLOW.memory
-    assert [memory_on(jobs, cores) - around for cores in (1, 2, 4)] == pytest.approx([3 * GB, 5 * GB, 6 * GB])
+    used = [memory_on(jobs, cores) - WORKFLOW_MEMORY for cores in (1, 2, 4)]
+    assert used == pytest.approx([3 * GB, 5 * GB, 6 * GB])
+    # Snakemake limits the memory of parallel jobs.
+    large = [item(name, memory=13 * GB) for name in "ab"]
+    assert memory_on(large, 2) - WORKFLOW_MEMORY == pytest.approx(14 * GB)
     assert memory_on([item("a", state=DONE)], 2) == 0
 
 
-def test_a_lack_of_memory_is_reported_with_a_sufficient_number_of_cores(monkeypatch, tmp_path):
-    jobs = [item(name, memory=20 * GB) for name in "abc"]
-    monkeypatch.setattr(requirements, "memory_of_machine", lambda: 24 * GB)
-    monkeypatch.setattr(requirements, "free_disk", lambda folder: 100 * GB)
-    (said,) = requirements.find_shortages(jobs, 2, tmp_path, {})
-    assert said.startswith(
-        "jobs on 2 cores need about 40.3 GB of memory, but this machine has 24 GB; --cores 1 needs 20"
-    )
-    assert requirements.find_shortages(jobs, 1, tmp_path, {}) == []
-    # Snakemake limits the memory of parallel jobs.
-    assert requirements.find_shortages(jobs, 2, tmp_path, {"executor": "icha", "resources": ["mem_mb=23000"]}) == []
+def test_a_lack_of_memory_or_disk_space_is_reported(monkeypatch, tmp_path):
+    jobs = [item(name, memory=12 * GB) for name in "ab"]
+    monkeypatch.setattr("icha.planning.plan.memory_of_machine", lambda: 13 * GB)
+    monkeypatch.setattr("icha.planning.plan.free_disk", lambda folder: 100 * GB)
+    (said,) = find_shortages(jobs, 2, tmp_path)
+    assert said.startswith("jobs on 2 cores need about 14.3 GB of memory, but this machine has 13 GB")
+    assert find_shortages(jobs, 1, tmp_path) == []
     # On a cluster the memory of this machine does not matter.
-    assert requirements.find_shortages(jobs, 2, tmp_path, {"executor": "slurm-batches"}) == []
-    (said,) = requirements.find_shortages([item("a", memory=30 * GB)], 2, tmp_path, {"resources": ["mem_mb=14000"]})
-    assert said.startswith("jobs on 2 cores need about 30.3 GB of memory") and "--cores" not in said
-
-
-def test_a_lack_of_disk_space_is_reported_with_the_free_space(monkeypatch, tmp_path):
-    monkeypatch.setattr(requirements, "free_disk", lambda folder: 9 * GB)
-    (said,) = requirements.find_shortages([item("a"), item("b")], 2, tmp_path, {})
+    assert find_shortages(jobs, 2, tmp_path, local=False) == []
+    monkeypatch.setattr("icha.planning.plan.free_disk", lambda folder: 9 * GB)
+    (said,) = find_shortages(jobs, 1, tmp_path)
     assert said.startswith(f"{tmp_path} needs about 10 GB of disk space, but only 9 GB are free")
-    assert requirements.find_shortages([item("a"), item("b", state=DONE)], 2, tmp_path, {}) == []
+    assert find_shortages([item("a"), item("b", state=DONE)], 1, tmp_path) == []
+
+
+def test_boundary_elements_use_one_core_and_save_checkpoints_on_large_grids(tmp_path):
+    content = yaml.safe_load(CAMPAIGN) | {"figures": {}, "confirmed": []}
+    content["surfaces"] = {"rough": content["surfaces"]["rough"] | {"grid": 2048}}
+    content["studies"]["load"] |= {"surfaces": ["rough"], "models": ["asperities", "boundary_elements"]}
+    (tmp_path / "large.yaml").write_text(yaml.safe_dump(content))
+    campaign = load_configuration(tmp_path / "large.yaml").campaign
+    threads = {case.model: run_threads(campaign, case) for case in campaign_files(campaign).runs.values()}
+    resumable = {case.model: is_resumable(campaign, case) for case in campaign_files(campaign).runs.values()}
+    assert threads == {"asperities": 2, "boundary_elements": 1}
+    assert resumable == {"asperities": False, "boundary_elements": True}
 
 
 def test_runs_of_both_models_at_given_loads_are_compared(tmp_path):

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 import yaml
-from conftest import REPOSITORY, copy_project, modules_of, snakemake, snakemake_command, wait_for
+from conftest import REPOSITORY, copy_project, snakemake, snakemake_command, wait_for
 from tiny_campaign import CAMPAIGN
 
 CONFIGURATION = "config/campaigns/tiny.yaml"
@@ -18,7 +18,7 @@ MANY["studies"]["load"]["seeds"] = list(range(1, 31))
 def start(project):
     """Start a call in a new process group."""
     command, environment = snakemake_command("runs", configuration=CONFIGURATION)
-    environment["PYTHONPATH"] = modules_of(project)
+    environment["PYTHONPATH"] = str(project)
     return subprocess.Popen(
         command,
         cwd=project,

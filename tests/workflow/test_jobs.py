@@ -133,7 +133,7 @@ def test_outdated_files_are_removed_if_jobs_will_run(arguments, dry_run, removed
     for path, stamp in STAMPS.items():
         Path(path).parent.mkdir(parents=True)
         write_dataset(DATASET.assign_attrs(stamp), path)
-        results = "results/tiny", "tiny", "tiny.yaml", "clone"
+        results = "results/tiny", "tiny.yaml"
         prepare.Results(*results, STAMPS, dry_run=dry_run)
         assert Path(path).exists()
         for lock in prepare.locks:
@@ -146,14 +146,14 @@ def test_outdated_files_are_removed_if_jobs_will_run(arguments, dry_run, removed
 def test_a_file_or_a_broken_link_instead_of_the_results_is_named(link, prepare):
     Path("results").symlink_to("nowhere") if link else Path("results").write_text("something else")
     with pytest.raises(SystemExit, match="results/tiny cannot be written to: instead of a folder there is"):
-        prepare.Results("results/tiny", "tiny", "tiny.yaml", "clone", {}).begin()
+        prepare.Results("results/tiny", "tiny.yaml", {}).begin()
 
 
 def test_a_folder_with_a_backslash_is_refused(prepare, tmp_path, monkeypatch):
     (tmp_path / "a\\b").mkdir()
     monkeypatch.chdir(tmp_path / "a\\b")
     with pytest.raises(SystemExit, match="has a backslash"):
-        prepare.Results("results/tiny", "tiny", "tiny.yaml", "clone", {}).begin()
+        prepare.Results("results/tiny", "tiny.yaml", {}).begin()
 
 
 def test_a_file_that_changed_after_its_inspection_is_neither_used_nor_copied(tmp_path, monkeypatch):

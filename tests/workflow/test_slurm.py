@@ -9,7 +9,7 @@ import subprocess
 
 import pytest
 import yaml
-from conftest import REPOSITORY, copy_project, modules_of, snakemake
+from conftest import REPOSITORY, copy_project, snakemake
 from slurm.single_node import single_node, why_not
 from tiny_campaign import CAMPAIGN
 
@@ -36,7 +36,7 @@ def call_with_profile(node, project):
         [PYTHON, "-m", "snakemake", "--workflow-profile", "slurm", "--configfile", CONFIGURATION,
          "--slurm-init-seconds-before-status-checks", "1"],
         cwd=project,
-        env=node.environment | {"PYTHONPATH": modules_of(project), "PYTHONDONTWRITEBYTECODE": "1"},
+        env=node.environment | {"PYTHONPATH": str(project), "PYTHONDONTWRITEBYTECODE": "1"},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,

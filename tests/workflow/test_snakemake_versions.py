@@ -12,7 +12,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from conftest import REPOSITORY, modules_of
+from conftest import REPOSITORY
 from packaging.requirements import Requirement
 from tiny_campaign import CAMPAIGN
 
@@ -48,7 +48,7 @@ def test_a_campaign_with_other_versions(version, tmp_path):
     def run():
         done = subprocess.run(
             [*map(str, command), "report", "--configfile", str(tmp_path / "tiny.yaml")],
-            env=os.environ | {"PYTHONPATH": modules_of(REPOSITORY)},
+            env=os.environ | {"PYTHONPATH": str(REPOSITORY)},
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
