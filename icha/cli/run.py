@@ -158,8 +158,8 @@ def _compute(command: list[str], workflow: Path, campaign, results: Path, target
         echo(f"Warning: {shortage}", err=True, fg="yellow")
     progress = Progress(items, results, cores)
     if progress.expected:
-        expected = f"{formatting.duration(time_on(items, cores))} on {format_count(cores, 'core')}"
-        echo(f"{campaign.name}: {format_count(len(progress.expected), 'file')} to compute, about {expected}")
+        expected = f"about {formatting.duration(time_on(items, cores))} on {format_count(cores, 'core')}"
+        echo(f"{campaign.name}: {format_count(len(progress.expected), 'file')} to compute, {expected}; planning …")
     log = results / "logs/snakemake.log"
     try:
         log.parent.mkdir(parents=True, exist_ok=True)
