@@ -2,11 +2,12 @@
 
 The time of a run follows a power law. Powers and scales of the laws are least-squares fits to the logarithms of
 measured times, mostly on one core of an AMD EPYC. Of the times in `tests/planning/measured_times.csv`, 90 % differ
-from the law by less than a factor of two.
+from the law by less than a factor of two. The measured times of finished batches correct the times of other runs.
 """
 
 import math
-from collections.abc import Mapping
+import statistics
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from icha.contact.models import MODELS
@@ -200,3 +201,14 @@ def analysis_cost(disk: float, values: float) -> Cost:
 def figure_cost(values: float, nodes: int) -> Cost:
     """Return the expected cost of a figure of runs with the `values`, bytes, and of a topography with `nodes` or 0."""
     return Cost(SHORT_JOB, JOB_MEMORY + _DRAWING + MAP_ARRAYS * _DOUBLE * nodes + _COPIES * values, 400e3)
+
+
+def correction(pairs: Sequence[tuple[float, float]]) -> float:
+    """Return the factor that corrects expected times; `pairs` are expected and measured times of similar jobs, s.
+
+    For n pairs, the factor is m^(n/(n + 1)), where m is the median of measured/expected time; without pairs it is 1.
+    """
+    if not pairs:
+        return 1.0
+    ratio = statistics.median(math.log(measured / expected) for expected, measured in pairs)
+    return math.exp(ratio * len(pairs) / (len(pairs) + 1))

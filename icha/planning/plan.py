@@ -4,7 +4,7 @@ import itertools
 import os
 import shutil
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from icha.configuration.campaign import Campaign
@@ -15,6 +15,7 @@ from icha.datasets.stamp import difference, read_stamp
 from icha.datasets.variables.campaign import STATUS_ATTRIBUTES
 from icha.figures.registry import declaration_of
 from icha.planning import costs
+from icha.planning.measured_times import correct_costs
 from icha.planning.requirements import largest_grid, run_threads, surface_threads
 from icha.planning.results import campaign_files, expected_stamps
 from icha.planning.run_costs import run_costs
@@ -86,14 +87,21 @@ def needed_for(targets: Iterable[str], items: Iterable[Item]) -> list[Item]:
     return [item for item in items if any(is_needed(item, name) for name in names)]
 
 
-def plan(campaign: Campaign, results: Path) -> list[Item]:
+def plan(campaign: Campaign, results: Path | None) -> list[Item]:
     """List all files of a campaign, except files of negligible cost, in the order of their computation.
 
     A surface, run or file of theories is done if it has the present stamp (`icha.datasets.stamp`). A file that is
-    computed from runs is done if it exists and no surface or run must be computed.
+    computed from runs is done if it exists and no surface or run must be computed. Measured times of finished runs
+    correct the expected times. If `results` is None, nothing counts as done.
     """
     files, cost_of_run, items = campaign_files(campaign), run_costs(campaign), []
-    state_of = _states(campaign, results)
+
+    def state_of(path):
+        return TO_DO, ""
+
+    # Checksums and fingerprints take time.
+    if results is not None and results.is_dir():
+        cost_of_run, state_of = correct_costs(campaign, cost_of_run, results), _states(campaign, results)
     for path, (name, _) in files.surfaces.items():
         cost, threads = costs.surface_cost(campaign.grid(name)), surface_threads(campaign, name)
         items.append(Item(SURFACES, "surfaces", path, *state_of(path), cost, threads))
@@ -109,8 +117,6 @@ def plan(campaign: Campaign, results: Path) -> list[Item]:
 
 def _states(campaign: Campaign, results: Path) -> Callable[[str], tuple[str, str]]:
     """Return a function that finds the state of a surface, run or file of theories, and the reason of the state."""
-    if not results.is_dir():
-        return lambda path: (TO_DO, "")  # checksums and fingerprints would take time
     stamps = expected_stamps(campaign)
 
     def state_of(path):
@@ -153,9 +159,12 @@ def _contains_runs(dataset: Path, campaign: Campaign) -> bool:
     return dataset.is_file() and (read_stamp(dataset) or {}).get("config_sha256") == campaign_sha256(campaign)
 
 
-def whole_cost(campaign: Campaign, results: Path) -> costs.Cost:
-    """Return the expected cost of a whole campaign: time on one core, memory for one job at a time, disk space."""
-    items = [replace(item, state=TO_DO) for item in plan(campaign, results)]
+def whole_cost(campaign: Campaign) -> costs.Cost:
+    """Return the expected cost of a whole campaign: time on one core, memory for one job at a time, disk space.
+
+    Measured times are not used, so the cost is the same on every machine.
+    """
+    items = plan(campaign, None)
     return costs.Cost(time_on(items, 1), memory_on(items, 1), sum(item.cost.disk for item in items))
 
 

@@ -1,11 +1,15 @@
 """The plan contains every file with its cost, and names what the machine lacks."""
 
+import json
+import os
+
 import numpy as np
 import pytest
 import yaml
 from conftest import REPOSITORY
 
 from icha.configuration.load import load_configuration
+from icha.planning.batches import run_batches
 from icha.planning.costs import JOB, START, WORKFLOW_MEMORY, Cost
 from icha.planning.plan import ANALYSIS, DONE, RUNS, TO_DO, Item, find_shortages, memory_on, needed_for, plan, time_on
 from icha.planning.requirements import is_resumable, run_threads
@@ -79,6 +83,24 @@ def test_targets_need_a_part_of_the_files(campaign, tmp_path):
     assert files.dataset in {item.path for item in needed_for(["dataset"], items)}
     assert [item.path for item in needed_for([f"results/scanned/{files.report}"], items)] == [files.report]
     assert needed_for([], items) == needed_for(["--forceall"], items) == needed_for(["runs", "all"], items) == items
+
+
+def test_measured_times_of_a_batch_correct_the_times_of_its_study(campaign, tmp_path):
+    def seconds():
+        return {item.path: item.cost.seconds for item in plan(campaign, tmp_path) if item.part == RUNS}
+
+    before, (batch, *_) = seconds(), run_batches(campaign, campaign_files(campaign).runs)
+    for path in batch.files:
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / path).touch()
+    # The job has kept one of the files.
+    kept, *computed = batch.files
+    os.utime(tmp_path / kept, (0, 0))
+    expected = JOB + sum(before[path] for path in computed)
+    benchmark = tmp_path / f"benchmarks/runs/{batch.name}.jsonl"
+    benchmark.parent.mkdir(parents=True)
+    benchmark.write_text(json.dumps({"s": 4 * expected}))
+    assert seconds() == pytest.approx({path: 2 * each for path, each in before.items()})
 
 
 def item(name, seconds=1.0, memory=1 * GB, state=TO_DO, threads=1, part=ANALYSIS):

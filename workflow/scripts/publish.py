@@ -34,7 +34,7 @@ def publish(archive, *, results, files, given, project):
         campaign=campaign,
         source=program_source(project),
         jobs=campaign_steps(campaign, given, Path(project)),
-        cost=whole_cost(campaign, Path(results)),
+        cost=whole_cost(campaign),
     )
 
 
