@@ -159,7 +159,7 @@ def run_process(command: list[str], folder: Path, log: Path, progress: Progress,
         for number, handler in handlers.items():
             signal.signal(number, handler)
     progress.count()
-    return process.returncode, bool(stopped)
+    return process.returncode, bool(stopped) or process.returncode < 0
 
 
 def _end_with_parent() -> None:
