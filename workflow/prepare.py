@@ -78,7 +78,10 @@ class Results:
             raise SystemExit(f"{reason} Nothing was computed.")
         reports = dry_run or any(REPORTING.fullmatch(argument.partition("=")[0]) for argument in sys.argv[1:])
         self._other_process = None if reports else hold_lock(f".snakemake/{self.folder.name}.lock")
-        wrong = dict(outdated(stamps))
+        try:
+            wrong = dict(outdated(stamps))
+        except OSError as error:
+            raise SystemExit(f"{folder}: results cannot be read: {error}. Nothing was computed.") from None
         if wrong:
             first, reason = next(iter(wrong.items()))
             others = f" and {format_count(len(wrong) - 1, 'more result')}" if len(wrong) > 1 else ""
