@@ -17,6 +17,8 @@ from icha.planning.run_costs import run_costs
 
 # Smallest number of batches of a group, unless they would be shorter than a fifth of `costs.BATCH`.
 _FEWEST = 4
+# Largest number of files in a batch. Snakemake's time for planning is proportional to the number.
+_MOST_FILES = 60
 T = TypeVar("T")
 
 
@@ -92,7 +94,7 @@ def _divide(files: Iterable[tuple[str, str, float]]) -> list[Batch]:
         longest = min(costs.BATCH, max(costs.BATCH / 5, total / _FEWEST))
         of_group: list[Batch] = []
         for path, seconds in members:
-            if not of_group or of_group[-1].seconds + seconds > longest:
+            if not of_group or of_group[-1].seconds + seconds > longest or len(of_group[-1].files) == _MOST_FILES:
                 of_group.append(Batch(f"{group}_{len(of_group)}", [], 0.0))
             last = of_group[-1]
             of_group[-1] = last._replace(files=[*last.files, path], seconds=last.seconds + seconds)

@@ -83,14 +83,18 @@ def _file_of(name: str) -> Path:
 
 @cache
 def _checksum_of(file: Path) -> str:
-    """Return the checksum of the syntax tree of a Python file and of the data files whose names the tree contains."""
+    """Return the checksum of the syntax tree of a Python file and of the data files that it names.
+
+    Data are files, and folders without modules, in the folder of the Python file.
+    """
     parts: list[str] = []
     _write(ast.parse(file.read_bytes(), file.name), parts)
     digest = hashlib.sha256("\n".join(parts).encode())
     texts = set(parts)
-    for path in sorted(path for path in file.parent.iterdir() if repr(path.name) in texts and path.suffix != ".py"):
+    named = (path for path in file.parent.iterdir() if repr(path.name) in texts and path.suffix != ".py")
+    for path in sorted(path for path in named if not (path / "__init__.py").exists()):
         for data in sorted(path.iterdir()) if path.is_dir() else [path]:
-            if data.is_file() and data.suffix not in (".py", ".pyc"):
+            if data.is_file():
                 digest.update(data.name.encode() + hashlib.sha256(data.read_bytes()).digest())
     return digest.hexdigest()
 

@@ -109,6 +109,13 @@ def test_a_data_file_counts_if_a_module_beside_it_names_it(checksum, tmp_path):
     second = checksum(MODULE)
     (tmp_path / "data.csv").write_text("2")
     assert len({first, second, checksum(MODULE)}) == 3
+    (tmp_path / "NAMES").mkdir()
+    (tmp_path / "NAMES/table.txt").write_text("1")
+    third = checksum(MODULE.replace("data.csv", "NAMES"))
+    (tmp_path / "NAMES/table.txt").write_text("2")
+    assert checksum(MODULE.replace("data.csv", "NAMES")) != third
+    (tmp_path / "NAMES/__init__.py").touch()  # a package, whose name is a word of the module by chance
+    assert checksum(MODULE.replace("data.csv", "NAMES")) not in (third, second)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="needs /proc/uptime")
