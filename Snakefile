@@ -16,7 +16,7 @@ from snakemake.utils import min_version
 min_version("9.17")
 
 # Modules of jobs cannot be replaced either. Snakemake inserts the path of Python into shell commands without quotes.
-os.environ["PYTHONSAFEPATH"] = "1"
+os.environ.update(PYTHONSAFEPATH="1")
 sys.executable = shlex.quote(sys.executable)
 
 

@@ -26,7 +26,7 @@ def planned(project, *arguments):
     rules = set()
     if "Nothing to be done" not in text:
         table = text.split("Job stats:")[1].split("total")[0]
-        names = re.findall(r"^(\w+) +\d+$", table, re.MULTILINE)
+        names = re.findall(r"^(\S+) +\d+$", table, re.MULTILINE)
         rules = {next((each for each in BATCHES if name.startswith(f"{each}_")), name) for name in names} - {"all"}
     warning = re.search(r"^outdated, .*?\)(?: and (\d+) more results?)?$", text, re.MULTILINE)
     return rules, 1 + int(warning[1] or 0) if warning else 0

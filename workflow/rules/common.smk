@@ -1,15 +1,18 @@
 # Shared by all rules: the campaign, its files and batches, and functions for parameters.
 
 import sys
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 
 sys.path.insert(0, str(Path(ROOT, "workflow")))
 
 import prepare
 
+from icha.configuration.cases import adhesive_contacts, run_settings, surface_settings
 from icha.configuration.load import collect_inputs
+from icha.datasets.results import SURFACE
 from icha.planning.batches import run_batches, surface_batches, theory_batches
+from icha.planning.requirements import is_resumable
 from icha.planning.results import campaign_files, expected_stamps
 from icha.support.checksums import LongList, sha256_of
 from icha.support.fingerprint import fingerprint
@@ -27,6 +30,9 @@ CONFIG_TEXT, NAMED_FILES = collect_inputs(CONFIGURATION)
 INPUTS = {f"{RESULTS}/{place}": file for place, file in NAMED_FILES.items()}
 COPIED = {copy: file for copy, file in INPUTS.items() if Path(copy).resolve() != Path(file).resolve()}
 
+# The surface file from which the theories of a surface are computed, by the name of the surface.
+FIRST_SURFACES = dict(reversed([(name, path) for path, (name, _) in FILES.surfaces.items()]))
+
 # Attributes of every dataset.
 ATTRIBUTES = {"campaign": CAMPAIGN.name, "license": PUBLICATION.license}
 
@@ -37,9 +43,44 @@ pathvars:
     benchmarks=f"{RESULTS}/benchmarks",
 
 
-def rule_name(kind, batch):
-    """Return the name of the rule of a batch."""
-    return f"{kind}_{batch.name}".replace("-", "_")
+def surface_arguments(path):
+    """Return the arguments of the task that makes a surface."""
+    name, seed = FILES.surfaces[path]
+    section, topography = CAMPAIGN.surfaces[name], CAMPAIGN.topography(name)
+    return {
+        "name": name,
+        "seed": seed,
+        "settings": surface_settings(CAMPAIGN, name),
+        "height_map": section.path if section.from_file else None,
+        "sha256": getattr(topography, "sha256", None),
+        "attributes": ATTRIBUTES | STAMPS[path],
+    }
+
+
+def theory_arguments(path):
+    """Return the arguments of the task that computes the theories of a surface."""
+    name = FILES.theories[path]
+    return {
+        "surface": FIRST_SURFACES[name],
+        "settings": surface_settings(CAMPAIGN, name),
+        "adhesive": adhesive_contacts(CAMPAIGN, name),
+        "attributes": ATTRIBUTES | STAMPS[path],
+    }
+
+
+def surface_of(case):
+    """Return the path of the surface of a run."""
+    return f"{RESULTS}/{SURFACE}".format(surface=case.surface, seed=case.seed)
+
+
+def run_arguments(path):
+    """Return the arguments of the task that computes a run."""
+    case = FILES.runs[path]
+    return run_settings(CAMPAIGN, case) | {
+        "surface": surface_of(case),
+        "attributes": ATTRIBUTES | {"study": case.study} | STAMPS[path],
+        "resumable": is_resumable(CAMPAIGN, case),
+    }
 
 
 def surfaces_for(runs):

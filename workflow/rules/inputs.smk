@@ -1,6 +1,5 @@
 # The configuration as used, topographies at rms slope 1 (shared by all slopes and materials), and theories.
 
-from icha.configuration.cases import adhesive_contacts, surface_settings
 from icha.planning.requirements import surface_memory, surface_threads
 
 
@@ -31,20 +30,6 @@ rule configuration:
         "../scripts/write_configuration.py"
 
 
-def surface_arguments(path):
-    """Return the arguments of the task that makes a surface."""
-    name, seed = FILES.surfaces[path]
-    section, topography = CAMPAIGN.surfaces[name], CAMPAIGN.topography(name)
-    return {
-        "name": name,
-        "seed": seed,
-        "settings": surface_settings(CAMPAIGN, name),
-        "height_map": section.path if section.from_file else None,
-        "sha256": getattr(topography, "sha256", None),
-        "attributes": ATTRIBUTES | STAMPS[path],
-    }
-
-
 # One rule for each batch. With `update`, a batch keeps the files that exist with the expected stamps. Files of the user
 # are compared by content, not by time, because the stamp contains their checksums.
 for batch in surface_batches(CAMPAIGN, FILES.surfaces):
@@ -52,7 +37,7 @@ for batch in surface_batches(CAMPAIGN, FILES.surfaces):
 
     rule:
         name:
-            rule_name("make", batch)
+            f"make_{batch.name}"
         input:
             ancient([CAMPAIGN.surfaces[name].path for name in names if CAMPAIGN.surfaces[name].from_file]),
         output:
@@ -76,25 +61,11 @@ for batch in surface_batches(CAMPAIGN, FILES.surfaces):
             "../scripts/make_surfaces.py"
 
 
-FIRST_SURFACES = dict(reversed([(name, path) for path, (name, _) in FILES.surfaces.items()]))
-
-
-def theory_arguments(path):
-    """Return the arguments of the task that computes the theories of a surface."""
-    name = FILES.theories[path]
-    return {
-        "surface": FIRST_SURFACES[name],
-        "settings": surface_settings(CAMPAIGN, name),
-        "adhesive": adhesive_contacts(CAMPAIGN, name),
-        "attributes": ATTRIBUTES | STAMPS[path],
-    }
-
-
 for batch in theory_batches(FILES.theories):
 
     rule:
         name:
-            rule_name("compute", batch)
+            f"compute_{batch.name}"
         input:
             surfaces_for({path: FIRST_SURFACES[FILES.theories[path]] for path in batch.files}),
         output:

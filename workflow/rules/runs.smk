@@ -1,31 +1,13 @@
 # Runs. One job computes a batch of short runs or one long run. A failed run does not fail its batch.
 
-from icha.configuration.cases import run_settings
-from icha.datasets.results import SURFACE
-from icha.planning.requirements import is_resumable, run_memory, run_minutes, run_threads
-
-
-def surface_of(case):
-    """Return the path of the surface of a run."""
-    return f"{RESULTS}/{SURFACE}".format(surface=case.surface, seed=case.seed)
-
-
-def run_arguments(path):
-    """Return the arguments of the task that computes a run."""
-    case = FILES.runs[path]
-    return run_settings(CAMPAIGN, case) | {
-        "surface": surface_of(case),
-        "attributes": ATTRIBUTES | {"study": case.study} | STAMPS[path],
-        "resumable": is_resumable(CAMPAIGN, case),
-    }
-
+from icha.planning.requirements import run_memory, run_minutes, run_threads
 
 for batch in run_batches(CAMPAIGN, FILES.runs):
     cases = [FILES.runs[path] for path in batch.files]
 
     rule:
         name:
-            rule_name("run", batch)
+            f"run_{batch.name}"
         input:
             surfaces_for({path: surface_of(FILES.runs[path]) for path in batch.files}),
         output:
