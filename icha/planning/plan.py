@@ -50,6 +50,7 @@ class Item:
     reason : why the file is outdated, why the run failed, or why physics ended it; otherwise empty.
     cost : expected cost of the file.
     threads : number of cores that the job uses.
+    start : share of the file in the start of its job; files that one job computes share the start.
     """
 
     part: str
@@ -59,6 +60,7 @@ class Item:
     reason: str
     cost: costs.Cost
     threads: int = 1
+    start: float = 1.0
 
     @property
     def to_do(self) -> bool:
@@ -68,9 +70,7 @@ class Item:
     @property
     def work(self) -> float:
         """Expected work in core-seconds, with the share of the file in the start of its job."""
-        in_batches = self.part in (SURFACES, RUNS)
-        start = costs.JOB * (min(1.0, self.cost.seconds / costs.BATCH) if in_batches else 1.0)
-        return (self.cost.seconds + start) * self.threads
+        return (self.cost.seconds + self.start * costs.JOB) * self.threads
 
 
 def needed_for(targets: Iterable[str], items: Iterable[Item]) -> list[Item]:
@@ -102,16 +102,18 @@ def plan(campaign: Campaign, results: Path | None) -> list[Item]:
     # Checksums and fingerprints take time.
     if results is not None and results.is_dir():
         cost_of_run, state_of = correct_costs(campaign, cost_of_run, results), _states(campaign, results)
+
+    def item(part, group, path, cost, threads=1):
+        return Item(part, group, path, *state_of(path), cost, threads, min(1.0, cost.seconds / costs.BATCH))
+
     for path, (name, _) in files.surfaces.items():
-        cost, threads = costs.surface_cost(campaign.grid(name)), surface_threads(campaign, name)
-        items.append(Item(SURFACES, "surfaces", path, *state_of(path), cost, threads))
+        cost = costs.surface_cost(campaign.grid(name))
+        items.append(item(SURFACES, "surfaces", path, cost, surface_threads(campaign, name)))
     for path, case in files.runs.items():
         group = f"study {case.study}" + (f", {MODELS[case.model].words}" if case.model != DEFAULT_MODEL else "")
-        items.append(Item(RUNS, group, path, *state_of(path), cost_of_run[case], run_threads(campaign, case)))
+        items.append(item(RUNS, group, path, cost_of_run[case], run_threads(campaign, case)))
     analysis = list(_analysis(campaign, results, items))
-    items += [
-        Item(THEORIES, "theories", path, *state_of(path), costs.analysis_cost(35e3, 0.0)) for path in files.theories
-    ]
+    items += [item(THEORIES, "theories", path, costs.analysis_cost(35e3, 0.0)) for path in files.theories]
     return items + analysis
 
 
@@ -139,14 +141,16 @@ def _analysis(campaign: Campaign, results: Path, computed: list[Item]) -> Iterat
     disk = sum(item.cost.disk for item in computed if item.part == RUNS)
     values = sum(item.cost.values for item in computed)
 
-    def item(part, path, cost):
+    def item(part, path, cost, start=1.0):
         state = DONE if not outdated and (results / path).is_file() else TO_DO
-        return Item(part, "dataset and checks" if part == ANALYSIS else part, path, state, "", cost)
+        group = "dataset and checks" if part == ANALYSIS else part
+        return Item(part, group, path, state, "", cost, start=start)
 
     sizes = {files.dataset: 0.5 * disk, files.table: 0.1 * disk, files.comparison: 0.03 * disk + 90e3}
     others = (*files.model_error, *files.answers, *files.sensitivity, files.checks)
-    for path, size in (sizes | dict.fromkeys(others, 100e3)).items():
-        yield item(ANALYSIS, path, costs.analysis_cost(size, values))
+    sizes |= dict.fromkeys(others, 100e3)
+    for path, size in sizes.items():
+        yield item(ANALYSIS, path, costs.analysis_cost(size, values), 1 / len(sizes))
     pictures = (path for path in files.figures if path.endswith("png"))
     for path, name in zip(pictures, campaign.figures.by_name(), strict=True):
         nodes = largest_grid(campaign) ** 2 if declaration_of(name).holds_topography else 0

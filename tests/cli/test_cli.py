@@ -543,7 +543,7 @@ def test_results_without_checks_are_named(empty_folder):
     assert "theories.nc: theories and published points" in printed("check", "theories.nc")
     assert "theories and published points" in printed("show", "theories.nc", status=2)
     Path("deposit").mkdir()
-    assert "deposit: is a folder" in printed("check", "deposit", status=2)
+    assert "deposit: has no SHA256SUMS" in printed("check", "deposit", status=2)
 
 
 @pytest.fixture

@@ -10,8 +10,8 @@ from conftest import REPOSITORY
 
 from icha.configuration.load import load_configuration
 from icha.planning.batches import run_batches
-from icha.planning.costs import JOB, START, WORKFLOW_MEMORY, Cost
-from icha.planning.plan import ANALYSIS, DONE, RUNS, TO_DO, Item, find_shortages, memory_on, needed_for, plan, time_on
+from icha.planning.costs import BATCH, JOB, START, WORKFLOW_MEMORY, Cost
+from icha.planning.plan import DONE, RUNS, TO_DO, Item, find_shortages, memory_on, needed_for, plan, time_on
 from icha.planning.requirements import is_resumable, run_threads
 from icha.planning.results import campaign_files
 from icha.planning.validity import surface_facts
@@ -77,6 +77,14 @@ def test_every_file_that_costs_something_is_planned(campaign, tmp_path):
     assert planned == {path for path in files.computed if not path.endswith((".pdf", ".txt"))}
 
 
+def test_files_share_the_start_of_their_job(campaign, tmp_path):
+    items, files = {item.path: item for item in plan(campaign, tmp_path)}, campaign_files(campaign)
+    run = items[next(iter(files.runs))]
+    assert run.work == pytest.approx(run.cost.seconds * (1 + JOB / BATCH))
+    analysed = [files.dataset, files.table, files.comparison, files.checks]
+    assert sum(items[path].start for path in analysed) == pytest.approx(1)
+
+
 def test_targets_need_a_part_of_the_files(campaign, tmp_path):
     items, files = plan(campaign, tmp_path), campaign_files(campaign)
     assert {item.path for item in needed_for(["runs", "--forceall"], items)} == {*files.surfaces, *files.runs}
@@ -103,8 +111,8 @@ def test_measured_times_of_a_batch_correct_the_times_of_its_study(campaign, tmp_
     assert seconds() == pytest.approx({path: 2 * each for path, each in before.items()})
 
 
-def item(name, seconds=1.0, memory=1 * GB, state=TO_DO, threads=1, part=ANALYSIS):
-    return Item(part, part, name, state, "", Cost(seconds, memory, 5 * GB), threads)
+def item(name, seconds=1.0, memory=1 * GB, state=TO_DO):
+    return Item("part", "group", name, state, "", Cost(seconds, memory, 5 * GB))
 
 
 def test_time_is_that_of_the_start_and_of_the_work_or_the_longest_job():
@@ -112,8 +120,6 @@ def test_time_is_that_of_the_start_and_of_the_work_or_the_longest_job():
     assert time_on(jobs, 1) == pytest.approx(START + 16 + 3 * JOB)
     assert time_on(jobs, 10**6) == pytest.approx(START + 10)
     assert time_on([item("a", state=DONE)], 1) == 0
-    # Short runs share the start of a job.
-    assert item("a", 1, part=RUNS).work < item("a", 1).work == pytest.approx(1 + JOB)
 
 
 def test_memory_is_that_of_parallel_jobs_and_of_snakemake():
