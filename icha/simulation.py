@@ -585,4 +585,5 @@ def _attributes(surface, material, path, name):
     if model.by_cells:
         attributes["attraction"] = attraction_on(material, surface.spacing)
     # A campaign sets the attributes that are empty here.
-    return attributes | {"contact_model": name} | dict.fromkeys(("campaign", "study", "config_sha256", "license"), "")
+    empty = ("campaign", "study", "config_sha256", "program_sha256", "license")
+    return attributes | {"contact_model": name} | dict.fromkeys(empty, "")
