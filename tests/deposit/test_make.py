@@ -138,7 +138,8 @@ def test_a_deposit_has_everything_and_nothing_else(project, published):
     for path, file in present.items():
         top, _, rest = path.partition("/")
         original = project / rest if top == "source" else project / "results/tiny" / path
-        assert not original.is_file() or file.read_bytes() == original.read_bytes(), path
+        if path != CHECKSUMS and original.is_file():
+            assert file.read_bytes() == original.read_bytes(), path
 
 
 @pytest.mark.slow
