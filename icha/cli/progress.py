@@ -82,13 +82,17 @@ class Progress:
 
     def time_left(self) -> str:
         """Return the expected time until all files are finished, as text."""
-        # Factor by which the files take longer than expected on this machine.
-        slowness = ((self._last - self._first) * self._cores + _PRIOR) / (self._done + _PRIOR)
-        waiting = self.expected - self.finished
+        waiting = [self._work[path] for path in self.expected - self.finished]
         if not waiting:
             return "finishing"
-        work = sum(self._work[path] for path in waiting)
-        left = work * slowness / self._cores - (time.monotonic() - self._last)
+        now = time.monotonic()
+        # Factor by which the files take longer than expected on this machine. If no file was finished for a long time,
+        # the factor grows, because each core is busy with at most one file.
+        slowness = max(
+            ((until - self._first) * self._cores + _PRIOR) / (self._done + running + _PRIOR)
+            for until, running in ((self._last, 0.0), (now, self._cores * max(waiting)))
+        )
+        left = sum(waiting) * slowness / self._cores - (now - self._last)
         return f"about {formatting.duration(left)} left" if left > 0 else "longer than expected"
 
 
