@@ -41,8 +41,8 @@ settings.load_profile("fast")
 
 # Files with the longest tests, the longest first. If such a file came last, one core would wait for it. With
 # `--dist worksteal` one worker begins with these files and the campaign, the other in the middle of the list.
-LONG = ("one_asperity", "every_case_ends", "full_contact", "slurm", "cli_run", "wheel", "faults", "rough_contacts")
-LONG += ("make", "in_browser", "reruns", "workflow", "energy_balance")
+LONG = ("one_asperity", "every_case_ends", "full_contact", "slurm", "cli_run", "wheel", "interruptions")
+LONG += ("rough_contacts", "make", "in_browser", "reruns", "workflow", "energy_balance")
 # Folders of tests whose coverage is measured (`--cov`). Measuring it nearly doubles the time of a test.
 PHYSICS = {"asperity", "boundary_elements", "contact", "equilibrium", "half_space", "path", "surfaces"}
 

@@ -10,7 +10,7 @@ from icha.support.atomic_files import whole_file
 def write_times(table: str | os.PathLike, benchmarks: str | os.PathLike) -> None:
     """Write the wall time and the peak memory of every job that has a benchmark file below a folder.
 
-    Only the memory that a job does not share with its parent process counts (`max_uss`). The memory is 0 if the
+    Only memory that a job does not share with other processes counts (`max_uss`). The memory is 0 if the
     job ended before the first measurement of its memory.
     """
     rows = ["job\tseconds\tmegabytes"]
