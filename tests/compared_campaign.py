@@ -10,7 +10,7 @@ import xarray as xr
 import icha
 from icha.analysis.model_error import contact_of_spots, model_error
 from icha.contact.attraction import FINITE_RANGE, NO_ATTRACTION, SHORT_RANGE
-from icha.datasets.campaign import campaign_tree
+from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import RunLabels
 
 PRESSURES = (3e-3, 1e-2)

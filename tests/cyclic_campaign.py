@@ -6,7 +6,7 @@ import numpy as np
 import small_campaign as small
 
 import icha
-from icha.datasets.campaign import campaign_tree
+from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import RunLabels
 from icha.datasets.variables.terms import MATERIAL
 from icha.path.energy_balance import summarise_loop

@@ -9,8 +9,8 @@ import small_campaign as small
 
 import icha
 from icha.analysis import model_error as comparison
-from icha.datasets import campaign_runs
-from icha.datasets.campaign import campaign_tree
+from icha.datasets import campaign_file
+from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import RunLabels
 
 SLOPES = {"crop1": 0.5, "crop2": 0.21, "crop3": 0.34}
@@ -41,8 +41,8 @@ def tree():
 @contextmanager
 def in_squares():
     """Arrange runs as earlier versions did: along all slopes of a study."""
-    modules = (campaign_runs, comparison)
-    arrange = campaign_runs.arrange_slopes
+    modules = (campaign_file, comparison)
+    arrange = campaign_file.arrange_slopes
     for module in modules:
         module.arrange_slopes = lambda pairs: np.unique([slope for _, slope in pairs])
     try:

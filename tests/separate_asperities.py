@@ -11,7 +11,7 @@ import xarray as xr
 import icha
 from icha.asperity.jkr import JKR
 from icha.datasets.build import get_values
-from icha.datasets.campaign import campaign_tree
+from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import RunLabels
 from icha.datasets.variables.terms import MATERIAL
 from icha.path.energy_balance import summarise_loop

@@ -147,7 +147,7 @@ def _small_spectrum():
 def _small_campaign():
     """Return a campaign of one run with unloading on a surface of a few summits."""
     import icha
-    from icha.datasets.campaign import campaign_tree
+    from icha.datasets.campaign_file import campaign_tree
 
     material = icha.Material(contact_modulus=25e6, surface_energy=0.05, interaction_range=2.071e-9)
     path = icha.Path(reduced_pressures=[5e-4, 1e-3], unload=True, max_step=0.5)

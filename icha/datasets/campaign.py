@@ -1,15 +1,10 @@
-"""Build the campaign dataset, and select runs and snapshots. The dataset has arrays along the labels of the runs."""
+"""Select runs and snapshots of a campaign dataset, which has arrays along the labels of the runs."""
 
-import tempfile
-from collections.abc import Collection, Iterable, Mapping
-from pathlib import Path
+from collections.abc import Collection
 
 import numpy as np
 import xarray as xr
 
-from icha.datasets.campaign_file import write_campaign
-from icha.datasets.campaign_runs import LabelledRun
-from icha.datasets.files import read_campaign
 from icha.datasets.labels import LABELS, RunLabels, labels_at, place_of, slopes_at
 from icha.datasets.variables.campaign import (
     BEYOND_MODEL,
@@ -28,16 +23,6 @@ from icha.path.targets import BETWEEN
 _OF_EVERY_CAMPAIGN = ("status", "step_count", "failure")
 # Variables of the campaign dataset that are attributes of a run.
 _TEXTS = ("applicability", "attraction")
-
-
-def campaign_tree(
-    runs: Iterable[LabelledRun], *, design: Iterable[RunLabels | tuple] | None = None, attrs: Mapping[str, str] = {}
-) -> xr.DataTree:
-    """Return the campaign dataset of some runs in memory; arguments and errors are those of `write_campaign`."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, "campaign.nc")
-        write_campaign(runs, path, design=design, attrs=attrs)
-        return read_campaign(path).load()
 
 
 def run_labels(tree: xr.DataTree) -> list[RunLabels]:

@@ -1,52 +1,61 @@
-"""Write the campaign dataset run by run, so that only a few numbers of each run stay in memory.
+"""Build the campaign dataset from the runs of all studies, and write it to a file.
 
-First, ICHA reads all runs, one by one, and appends their values to a temporary file. The sizes of all arrays, the
-snapshots and the lengths of texts stay in memory, because ICHA needs this information before it writes the first run.
-Then ICHA reads the temporary file in the order of the dataset, and writes one block of neighbouring runs at a time.
+Each study is one group with arrays along the labels of its runs. ICHA reads all runs into memory, arranges them along
+the labels, and fills the arrays of a study one after the other. `docs/howto/dataset.md` describes the dataset.
 """
+
+from __future__ import annotations
 
 import itertools
 import math
 import os
-import pickle
-import tempfile
 from collections.abc import Iterable, Mapping
-from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import Any
 
-import netCDF4
 import numpy as np
+import xarray as xr
 
 from icha.datasets.attributes import COLLECTED, combine_attributes
-from icha.datasets.campaign_runs import Arrangement, LabelledRun, arrange_runs, spool_runs
-from icha.datasets.files import (
-    FLOAT_FILL,
-    INTEGER_FILL,
-    characters,
-    coordinates_of,
-    define_dimensions,
-    define_variable,
-    is_text,
+from icha.datasets.build import describe_variables
+from icha.datasets.files import check_is_run, encode_texts, is_text, read_run, readable, write_dataset
+from icha.datasets.labels import LABELS, RunLabels, arrange_slopes, slope_dims
+from icha.datasets.variables.campaign import (
+    BEYOND_MODEL,
+    CAMPAIGN,
+    COMPLETE,
+    FAILED_CHECKS,
+    INCOMPLETE,
+    MISSING,
+    NOT_IN_DESIGN,
+    RAGGED,
+    STATUS_ATTRIBUTES,
+    VARIES_WITH,
+    VARIES_WITH_OWN_UNITS,
+    WHOLE_RUNS,
+    index_variable,
 )
-from icha.datasets.labels import LABELS, RunLabels
-from icha.datasets.results import COMPRESSION, LEAST_COMPRESSED
-from icha.datasets.variables.campaign import CAMPAIGN, RAGGED, index_variable
-from icha.datasets.variables.run import FURTHER
-from icha.support.atomic_files import whole_file
+from icha.datasets.variables.run import CELLS, CYCLE, FURTHER, INDENTER, LOOP, OF_MODELS, RUN
+from icha.support.input_files import text
 
-# A block has at most _RUNS_IN_BLOCK runs and VALUES_IN_BLOCK values of each variable, so it needs some megabytes.
-_RUNS_IN_BLOCK = 256
-VALUES_IN_BLOCK = 2**18
-_VALUES_IN_CHUNK = 2**16
+# Labels of a run, and the dataset of the run or the path of its file.
+LabelledRun = tuple[RunLabels | tuple, xr.Dataset | str | os.PathLike]
+
+# Variables of runs that are in the campaign dataset: all except maps.
+_OF_RUNS = [
+    name
+    for name, described in (RUN | OF_MODELS | CYCLE | LOOP | INDENTER).items()
+    if not set(CELLS) & set(described.dims)
+]
 # Values that must be the same for several runs count as equal up to this relative difference.
 _SAME = 1e-9
+_ENDED_EARLY = (INCOMPLETE, BEYOND_MODEL)
 
 _LAYOUT = (
     "Variables of the runs along model, surface, seed, rms_slope and material. Spots and events are ragged arrays "
     "along spot and event, with one run after the other in the order of the labels. A variable with the attribute "
     "instance_dimension gives, for each spot or event, the position of its run or snapshot along this dimension."
 )
-_OWN_SLOPES = {"comment": "each surface has different slopes, in ascending order along the dimension rms_slope"}
+_OWN_SLOPES = "each surface has different slopes, in ascending order along the dimension rms_slope"
 _STUDIES = "The runs of every study, with one group for each study."
 # Attribute of the root of the file. The root has no variables.
 _ACCESS = (
@@ -55,195 +64,319 @@ _ACCESS = (
 )
 
 
-class Column(NamedTuple):
-    """A variable of the runs, as defined in the file.
+class _Run:
+    """A run in memory.
 
     Attributes
     ----------
-    variable : the variable in the file.
-    along : labels that are dimensions of the variable.
-    dims : other dimensions of the variable.
-    fill : value that marks a missing value.
+    labels : labels of the run.
+    source : dataset of the run, or path of its file.
+    values : values of each variable, by name; texts are bytes. `_Study` removes the values that it has used.
+    attrs : global attributes of the run.
+    snapshots : kind and target of each snapshot of the run.
+    step_count : number of steps.
+    status, failure : status of the run, and reason why the run is not complete ("" for a complete run).
+    extent : sort key; the run with the largest extent has the most variables and steps.
     """
 
-    variable: netCDF4.Variable
-    along: tuple[str, ...]
-    dims: tuple[str, ...]
-    fill: float | int | bytes
+    def __init__(self, labels: RunLabels, source: xr.Dataset | str | os.PathLike):
+        self.labels, self.source = labels, source
+        self.values, self.attrs = (_values_of if isinstance(source, xr.Dataset) else _read_values)(source)
+        kinds, targets = (self.values.get(f"snapshot_{name}", np.empty(0)).tolist() for name in ("kind", "target"))
+        self.snapshots = list(zip(kinds, targets, strict=True))
+        self.step_count = self.values["step"].size
+        reasons = [(status, str(self.attrs[name])) for status, name in STATUS_ATTRIBUTES.items() if name in self.attrs]
+        self.status, self.failure = (*reasons, (COMPLETE, ""))[0]
+        self.extent = self.status not in _ENDED_EARLY, len(self.values), self.step_count
 
-    def pad(self, values: np.ndarray) -> np.ndarray:
-        """Pad texts of a run to the width of texts in the file; return numbers unchanged."""
-        if values.dtype.kind != "S":
-            return values
-        padded = np.zeros((*values.shape[:-1], self.variable.shape[-1]), "S1")
-        padded[..., : values.shape[-1]] = values
-        return padded
-
-    def slots(self, snapshots: list[int], values: np.ndarray) -> tuple[list[int] | slice, ...]:
-        """Return the indices of a run's values along `dims`; `snapshots` are the indices of the run's snapshots."""
-        sizes = zip(self.dims, values.shape, strict=False)
-        return tuple(snapshots if dim == "snapshot" else slice(0, size) for dim, size in sizes)
+    def sample(self) -> xr.Dataset:
+        """Return the dataset of the run without maps, with the attributes of its variables."""
+        run = self.source if isinstance(self.source, xr.Dataset) else read_run(self.source)
+        return run.drop_dims(CELLS, errors="ignore")
 
 
-class Group(NamedTuple):
-    """The group of a study in a file, with defined dimensions and variables but without values.
+def _read_values(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    """Read the values and the global attributes of a run from its file, without maps.
+
+    The low-level interface of h5py takes a quarter of the time that xarray takes.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read or is not a run dataset.
+    """
+    import h5py  # imported here because the import is slow, and most callers do not read runs
+    from h5py import h5d, h5s
+
+    with readable(path), h5py.File(path) as file:
+        check_is_run(file, path)
+        values = {}
+        for name in _OF_RUNS:
+            if name in file:
+                variable = h5d.open(file.id, name.encode())
+                found = np.empty(variable.shape, variable.dtype.newbyteorder("="))
+                variable.read(h5s.ALL, h5s.ALL, found)
+                # The last dimension of texts is that of their characters.
+                values[name] = found.view(f"S{found.shape[-1]}")[..., 0] if found.dtype == "S1" else found
+        names = ("applicability", "attraction", *STATUS_ATTRIBUTES.values())
+        return values, {name: text(file.attrs[name]) for name in names if name in file.attrs}
+
+
+def _values_of(run: xr.Dataset) -> tuple[dict[str, np.ndarray], Mapping]:
+    """Return the values and attributes of a run in memory, as `_read_values` does for a file."""
+    variables = run.drop_dims(CELLS, errors="ignore").variables
+    return {name: encode_texts(v.values) if is_text(v.dtype) else v.values for name, v in variables.items()}, run.attrs
+
+
+class _Study:
+    """The arrays of a study along the labels of its runs.
 
     Attributes
     ----------
-    study : the runs of the study.
-    block : for every label, number of neighbouring runs that are written at once.
-    columns : variables of the runs, by name.
-    ragged : variables along ragged dimensions, by dimension and name.
-    known : variables that do not depend on the content of runs, with their values.
+    runs : the computed runs, in the order of their positions along the labels.
+    places : index of each run along each label.
+    axes : values of each label.
+    sizes : sizes of all dimensions except those of spots and events.
+    snapshots : index of each snapshot along the dimension `snapshot`, by kind and target.
+    variables : variables of the runs with their attributes, each from one run as an example.
+    coordinates : names of the variables that are coordinates.
+    origins : global attributes of the examples.
     """
 
-    study: Arrangement
-    block: tuple[int, ...]
-    columns: dict[str, Column]
-    ragged: dict[str, dict[str, netCDF4.Variable]]
-    known: list[tuple[netCDF4.Variable, np.ndarray]]
+    def __init__(self, name: str, design: list[RunLabels], found: Mapping[RunLabels, _Run]):
+        self.name, self.design = name, design
+        self.axes: dict[str, Any] = {label: list(dict.fromkeys(getattr(r, label) for r in design)) for label in LABELS}
+        self.axes["seed"].sort()
+        self.axes["rms_slope"] = arrange_slopes((labels.surface, labels.rms_slope) for labels in design)
+        self.places = _positions(self.axes, design)
+        runs = [found[labels] for labels in design if labels in found]
+        if not runs:
+            raise ValueError(f"study {name}: no run is computed; expected at least one run")
+        self.variables: dict[str, xr.Variable] = {}
+        self.coordinates, self.origins = set(LABELS), []
+        models = set()
+        longest_first = sorted(runs, key=lambda run: run.extent, reverse=True)
+        for run in sorted(longest_first, key=lambda run: self.axes["model"].index(run.labels.model)):
+            if run.labels.model not in models or not run.values.keys() <= self.variables.keys():
+                models.add(run.labels.model)
+                sample = run.sample()
+                self.variables = dict(sample.variables) | self.variables
+                self.coordinates |= set(sample.coords)
+                self.origins.append(sample.attrs)
+        # Kind and target identify a snapshot. Runs may have their snapshots in different orders.
+        snapshots = dict.fromkeys(itertools.chain(*(run.snapshots for run in (longest_first[0], *runs))))
+        self.snapshots = {each: k for k, each in enumerate(snapshots)}
+        self.runs = sorted(runs, key=lambda run: self.places[run.labels])
+        self.sizes = {dim: n for v in self.variables.values() for dim, n in v.sizes.items() if dim not in RAGGED}
+        largest = {"snapshot": len(snapshots), "step": max(run.step_count for run in runs)}
+        self.sizes |= {dim: size for dim, size in largest.items() if dim in self.sizes}
+        self.sizes |= {label: len(self.axes[label]) for label in LABELS}
+        self.sizes["rms_slope"] = self.axes["rms_slope"].shape[-1]
+        self.varies_with = VARIES_WITH_OWN_UNITS if self._has_own_units() else VARIES_WITH
+
+    def _has_own_units(self) -> bool:
+        """Return whether runs of equal rms slopes may have different units: with shapes, and with rms heights."""
+        units: dict[float, list[float]] = {}
+        for run in self.runs:
+            units.setdefault(run.labels.rms_slope, []).append(float(run.values.get("unit_slope", math.nan)))
+        return "shape" in self.variables or any(max(each) > (1 + _SAME) * min(each) for each in units.values())
+
+    def dataset(self, varied: Mapping[str, tuple[str, str, dict]], attrs: Mapping[str, str]) -> xr.Dataset:
+        """Return the dataset of the study; the values of the runs are removed, because arrays now contain them.
+
+        `varied` are the varied parameters as in `campaign_tree`, and `attrs` the attributes of the file.
+        """
+        variables: dict[str, xr.Variable] = {}
+        for name, variable in self.variables.items():
+            if name in self.sizes and name not in LABELS:
+                variables[name] = xr.Variable(name, np.arange(self.sizes[name], dtype=np.int32), variable.attrs)
+            elif name not in LABELS and not set(variable.dims) & set(RAGGED):
+                variables[name] = self._along_labels(name)
+        for dim in RAGGED:
+            if names := [name for name, variable in self.variables.items() if variable.dims == (dim,)]:
+                variables |= self._ragged(dim, names)
+        variables |= self._of_design()
+        coordinates = {name: variables.pop(name) for name in self.coordinates if name in variables}
+        coordinates |= {
+            name: _along_label(name, *each, self.axes) for name, each in varied.items() if name not in variables
+        }
+        shared = {"study": self.name, "license": self.origins[0].get("license")}
+        # The checksum of the campaign, and not that of one of the runs.
+        shared["config_sha256"] = attrs.get("config_sha256")
+        given = {name: value for name, value in shared.items() if value is not None}
+        described = combine_attributes(f"Study {self.name}", _LAYOUT, COLLECTED, self.origins)
+        return xr.Dataset(variables, coordinates, described | given)
+
+    def _of_design(self) -> dict[str, xr.Variable]:
+        """Return the labels, and the variables that describe each run of the design, such as `status`."""
+        shape = tuple(self.sizes[label] for label in LABELS)
+        values: dict[str, Any] = dict(self.axes)
+        values["status"] = np.full(shape, NOT_IN_DESIGN, np.int8)
+        values["step_count"] = np.zeros(shape, np.int32)
+        texts = ("failure", "applicability", "attraction")
+        values |= {name: np.full(shape, "", object) for name in texts}
+        for labels in self.design:
+            values["status"][self.places[labels]] = MISSING
+        for run in self.runs:
+            place, status, failure = self.places[run.labels], run.status, run.failure
+            if status in (*WHOLE_RUNS, FAILED_CHECKS) and len(run.snapshots) != len(self.snapshots):
+                status, failure = INCOMPLETE, f"{len(run.snapshots)} of {len(self.snapshots)} snapshots"
+            values["status"][place], values["step_count"][place] = status, run.step_count
+            for name, value in zip(texts, (failure, *(run.attrs.get(each, "") for each in texts[1:])), strict=True):
+                values[name][place] = str(value)
+        slopes = values.pop("rms_slope")
+        variables = describe_variables(CAMPAIGN, values)
+        attributes = CAMPAIGN["rms_slope"].attributes | ({"comment": _OWN_SLOPES} if slopes.ndim > 1 else {})
+        return variables | {"rms_slope": xr.Variable(slope_dims(slopes), slopes, attributes)}
+
+    def _along(self, name: str) -> tuple[str, ...]:
+        """Return the labels along which a variable of the runs varies."""
+        along, dims = self.varies_with.get(name, LABELS), slope_dims(self.axes["rms_slope"])
+        if "rms_slope" not in along:
+            return along
+        return tuple(label for label in LABELS if label in {*along, *dims})
+
+    def _along_labels(self, name: str) -> xr.Variable:
+        """Return the array of a variable of all runs.
+
+        Raises
+        ------
+        ValueError
+            If runs differ in a value that they must share. The message names the run.
+        """
+        along, dims = self._along(name), self.variables[name].dims
+        having = [run for run in self.runs if name in run.values]
+        shape = [self.sizes[dim] for dim in (*along, *dims)]
+        array = _empty(shape, [run.values[name].dtype for run in having])
+        columns = [LABELS.index(label) for label in along]
+        for run in having:
+            values = run.values.pop(name)
+            snapshots = [self.snapshots[each] for each in run.snapshots]
+            sizes = zip(dims, values.shape, strict=True)
+            slots = tuple(snapshots if dim == "snapshot" else slice(size) for dim, size in sizes)
+            of_run = array[(*(self.places[run.labels][column] for column in columns), ...)]
+            if along != LABELS:
+                values = _shared(of_run[slots], values, f"{run.labels}: {name}", along)
+            of_run[slots] = values
+        return self._variable(name, (*along, *dims), array, len(having) == len(self.runs))
+
+    def _ragged(self, dim: str, names: list[str]) -> dict[str, xr.Variable]:
+        """Return the variables along a ragged dimension, and for each of its values the index of its run.
+
+        The spots of a run are sorted by the index of their snapshot.
+        """
+        rows: dict[str, list[np.ndarray]] = {name: [] for name in names}
+        counts = []
+        for run in self.runs:
+            found = {name: run.values.pop(name) for name in names if name in run.values}
+            counts.append(len(next(iter(found.values()), ())))
+            order = slice(None)
+            if "spot_snapshot" in found:
+                numbers = np.array([self.snapshots[each] for each in run.snapshots], np.int32)
+                found["spot_snapshot"] = numbers[found["spot_snapshot"]]
+                order = np.argsort(found["spot_snapshot"], kind="stable")
+            for name in names:
+                rows[name].append(found[name][order] if name in found else np.full(counts[-1], np.nan))
+        variables = {name: self._variable(name, (dim,), np.concatenate(rows.pop(name)), True) for name in names}
+        places = np.array([self.places[run.labels] for run in self.runs], np.int32)
+        for label, column in zip(LABELS, np.repeat(places, counts, axis=0).T, strict=True):
+            described = index_variable(dim, label)
+            variables[f"{dim}_{label}"] = xr.Variable(described.dims, column, described.attributes)
+        return variables
+
+    def _variable(self, name: str, dims: tuple[str, ...], array: np.ndarray, everywhere: bool) -> xr.Variable:
+        """Return the variable of an array; `everywhere` is True if all runs have the variable.
+
+        Every netCDF tool reads integers of 32 bits, and flags of 8 bits. As in xarray, integers of which some are
+        missing are floats with the encoding of integers.
+        """
+        example, encoding = self.variables[name], {}
+        owners = [model for model, names in FURTHER.items() if name in names]
+        lacking = [model for model in self.axes["model"] if owners and model not in owners]
+        missing = f"in runs with the model {' or '.join(lacking)}" if lacking else ""
+        if name in INDENTER and not everywhere:
+            missing = "in runs whose model, shape or path does not define the value"
+        if array.dtype.kind == "S":
+            array = np.char.decode(array, "utf-8").astype(object)
+        elif example.dtype.kind in "iu":
+            if array.dtype.kind == "f" and np.isnan(array).any():
+                encoding = {"dtype": np.dtype(np.int32)}
+            else:
+                array = array.astype(np.int8 if example.dtype == np.int8 else np.int32)
+        return xr.Variable(dims, array, example.attrs | ({"missing": missing} if missing else {}), encoding)
 
 
-def _group_attributes(study: Arrangement, attrs: Mapping[str, str]) -> dict:
-    """Return the attributes of a study's group; `attrs` are the attributes of the file."""
-    # config_sha256 is the checksum of the campaign, and not that of one of the runs.
-    shared = {"license": study.origins[0].get("license"), "config_sha256": attrs.get("config_sha256")}
-    return (
-        combine_attributes(f"Study {study.name}", _LAYOUT, COLLECTED, study.origins)
-        | {"study": study.name}
-        | {name: value for name, value in shared.items() if value is not None}
-    )
+def _empty(shape: list[int], dtypes: list[np.dtype]) -> np.ndarray:
+    """Return an array of missing values: empty texts of the largest length of the types, or NaN for numbers."""
+    texts = [dtype.itemsize for dtype in dtypes if dtype.kind == "S"]
+    return np.zeros(shape, f"S{max(texts)}") if texts else np.full(shape, np.nan)
 
 
-def define_group(
-    group: netCDF4.Dataset, study: Arrangement, attrs: Mapping[str, str], varied: Mapping[str, tuple[str, str, dict]]
-) -> Group:
-    """Define dimensions, variables and attributes of a study's group; `attrs` are the attributes of the file.
+def _shared(known: np.ndarray, values: np.ndarray, where: str, along: tuple[str, ...]) -> np.ndarray:
+    """Return the known values that several runs share, and `values` where none is known."""
+    if known.dtype.kind == "S":
+        unknown, equal = known == b"", known == values
+    else:
+        unknown, equal = np.isnan(known), np.isclose(known, values, rtol=_SAME, atol=0)
+    if not np.all(unknown | equal):
+        shared = ", ".join(along) or "the study"
+        raise ValueError(f"{where} differs between runs that share {shared}; expected equal values")
+    return np.where(unknown, values, known)
 
-    varied : varied parameters of the study, as in `write_campaign`. Variables of the runs keep their values.
-    """
-    varied = {name: each for name, each in varied.items() if name not in study.variables}
-    counts = {
-        dim: sum(entry.sizes.get(dim, 0) for entry in study.entries)
-        for dim in RAGGED
-        if any(dim in variable.dims for variable in study.variables.values())
-    }
-    sizes = dict(zip(LABELS, study.known["status"].shape, strict=True)) | study.sizes | counts
-    define_dimensions(group, sizes)
-    group.setncatts(_group_attributes(study, attrs))
-    dims_in_file = {name: sum(study.dims_of(name), ()) for name in study.variables}
-    dims_in_file |= {name: described.dims for name, described in CAMPAIGN.items()} | {"rms_slope": study.slope_dims}
-    dims_in_file |= {name: (label,) for name, (label, *_) in varied.items()}
-    coordinates = coordinates_of(study.variables, {*study.coordinates, *varied}, dims_in_file)
-    varying = [dims for along, dims in map(study.dims_of, study.variables) if along == LABELS]
-    block = _block(sizes, LABELS, max(math.prod(sizes[dim] for dim in dims) for dims in varying))
 
-    def define(name, attributes, along, dims, dtype, width=0, fill=None):
-        """Define a variable along labels and further dimensions; `width` is the length of texts in bytes."""
-        options = _storage(sizes, block, along, dims, width)
-        attributes = {**attributes, **({"coordinates": coordinates[name]} if name in coordinates else {})}
-        options |= {} if width or fill is None else {"fill_value": fill}
-        return define_variable(group, name, along + dims, dtype, attributes, width, **options)
+def _along_label(name: str, label: str, unit: str, by_name: Mapping, axes: Mapping[str, Any]) -> xr.Variable:
+    """Return the coordinate of a varied parameter that depends on one label; `by_name` has its values."""
+    given = [by_name.get(each) for each in axes[label]]
+    attributes = {"units": unit, "long_name": f"{name.replace('_', ' ')} of the {label}", "varied": "true"}
+    if all(isinstance(value, int | float | None) for value in given):
+        values = np.array([math.nan if value is None else value for value in given], float)
+        attributes |= {"missing": f"for a {label} without this parameter"} if None in given else {}
+    else:
+        values = np.array(["" if value is None else str(value) for value in given], object)
+    return xr.Variable((label,), values, attributes)
 
-    columns, known = {}, []
-    for name in (name for name in study.variables if name not in sizes):
-        along, dims = study.dims_of(name)
-        attributes, dtype = study.variables[name].attrs | _why_lacking(study, name), study.variables[name].dtype
-        lacks, width = study.lacks(name), 0
-        fill: float | int | bytes = FLOAT_FILL if dtype.kind == "f" else INTEGER_FILL if lacks else 0
-        if is_text(dtype):
-            dtype, width, fill = np.dtype("S1"), max(entry.widths.get(name, 1) for entry in study.entries), b""
-        elif dtype.kind != "f":
-            # Every netCDF tool reads integers of 32 bits. Flags have 8 bits.
-            dtype = np.dtype(np.int8 if dtype == np.int8 and not lacks else np.int32)
-        variable = define(name, attributes, along, dims, dtype, width, fill if lacks and not width else None)
-        columns[name] = Column(variable, along, dims, fill)
-    for dim, size in study.sizes.items():
-        if dim in study.variables:
-            known.append((define(dim, study.variables[dim].attrs, (), (dim,), np.int32), np.arange(size)))
-    for name, described in CAMPAIGN.items():
-        along, dims, attributes, fill = (), described.dims, described.attributes, None
-        if dims == LABELS:
-            along, dims = dims, ()
-        is_texts = described.dtype is str
-        values = characters(study.known[name]) if is_texts else np.asarray(study.known[name], described.dtype)
-        if name == "rms_slope" and values.ndim > 1:
-            dims, attributes = study.slope_dims, attributes | _OWN_SLOPES
-            fill = FLOAT_FILL if np.isnan(values).any() else None
-            values = np.nan_to_num(values, nan=FLOAT_FILL)
-        width = values.shape[-1] if is_texts else 0
-        known.append((define(name, attributes, along, dims, values.dtype, width, fill), values))
-    for name, (label, unit, by_name) in varied.items():
-        given = [by_name.get(each) for each in study.known[label]]
-        numbers = all(isinstance(value, int | float) or value is None for value in given)
-        values = (
-            np.array([math.nan if value is None else value for value in given], float)
-            if numbers
-            else characters(np.array(["" if value is None else str(value) for value in given], object))
+
+def _positions(axes: Mapping[str, Any], design: list[RunLabels]) -> dict[RunLabels, tuple[int, ...]]:
+    """Return the index of every run of a design along each label."""
+    at = {(label, value): k for label in LABELS if label != "rms_slope" for k, value in enumerate(axes[label])}
+    rows = np.broadcast_to(axes["rms_slope"], (len(axes["surface"]), axes["rms_slope"].shape[-1])).tolist()
+    for surface, row in zip(axes["surface"], rows, strict=True):
+        at |= {((surface, "rms_slope"), slope): k for k, slope in enumerate(row)}
+    return {
+        labels: tuple(
+            at[(labels.surface, label) if label == "rms_slope" else label, getattr(labels, label)] for label in LABELS
         )
-        attributes = {"units": unit, "long_name": f"{name.replace('_', ' ')} of the {label}", "varied": "true"}
-        width = 0 if numbers else values.shape[-1]
-        known.append((define(name, attributes, (), (label,), values.dtype, width), values))
-    ragged = {dim: {name: each.variable for name, each in columns.items() if each.dims == (dim,)} for dim in counts}
-    for dim, variables in ragged.items():
-        for label in LABELS:
-            name = f"{dim}_{label}"
-            variables[name] = define(name, index_variable(dim, label).attributes, (), (dim,), np.int32)
-    return Group(study, block, columns, ragged, known)
+        for labels in design
+    }
 
 
-def _storage(sizes, block, along, dims, width):
-    """Return the storage options of a variable: a large variable is compressed, one chunk per block of runs."""
-    shape = (*(sizes[dim] for dim in dims), *([width] if width else []))
-    if math.prod(sizes[dim] for dim in along) * math.prod(shape) < LEAST_COMPRESSED:
-        return {}
-    if along != LABELS:
-        block = _block(sizes, along, math.prod(shape))
-    chunk = (*block, *shape) if along else tuple(min(size, _VALUES_IN_CHUNK) for size in shape)
-    # Each block is written at once, so a cache of more than one block has no advantage.
-    return COMPRESSION | {"chunksizes": chunk, "chunk_cache": 8 * math.prod(chunk)}
+def _plain(labels: RunLabels | tuple) -> RunLabels:
+    """Return labels with seed and slope as Python's int and float instead of types of numpy."""
+    labels = RunLabels(*labels)
+    return labels._replace(seed=int(labels.seed), rms_slope=float(labels.rms_slope))
 
 
-def _block(sizes, along, values):
-    """Return the number of neighbouring runs per block along every label; `values` is the number of values per run."""
-    left = max(1, min(_RUNS_IN_BLOCK, VALUES_IN_BLOCK // max(1, values)))
-    block = []
-    for size in reversed([sizes[label] for label in along]):
-        block.append(min(size, left))
-        left = left // size if block[-1] == size else 1
-    return tuple(reversed(block))
-
-
-def _why_lacking(study, name):
-    """Return the attribute `missing`, which names the models without the variable; {} if every model has it."""
-    owners = [model for model, names in FURTHER.items() if name in names]
-    lacking = [model for model in study.known["model"] if owners and model not in owners]
-    return {"missing": f"in runs with the model {' or '.join(lacking)}"} if lacking else {}
-
-
-def write_campaign(
+def campaign_tree(
     runs: Iterable[LabelledRun],
-    path: str | os.PathLike,
     *,
     design: Iterable[RunLabels | tuple] | None = None,
     attrs: Mapping[str, str] = {},
     varied: Mapping[str, Mapping[str, tuple[str, str, dict]]] = {},
-) -> None:
-    """Write all runs of a campaign to one netCDF-4 file, with one group for each study and arrays along labels.
+) -> xr.DataTree:
+    """Build the campaign dataset: one group for each study, with arrays along the labels of the runs.
 
-    `docs/howto/dataset.md` describes the file. The file does not contain the maps of boundary elements.
+    The dataset does not contain the maps of boundary elements.
 
     Parameters
     ----------
     runs : for each run, its labels (study, model, surface, seed, rms_slope, material), and its dataset or path. Names
-        in the file have the order of the design. Seeds and slopes are sorted. A run counts as incomplete if it has the
-        attribute `incomplete`, or if it lacks a snapshot that another run of its study has.
-    path : the file to write. A file appears only when it is complete. The same runs give the same bytes.
+        have the order of the design. Seeds and slopes are sorted. A run counts as incomplete if it has the attribute
+        `incomplete`, or if it lacks a snapshot that another run of its study has.
     design : labels of all runs of the campaign. Default: the labels in `runs`. Other combinations of these labels have
         the status `not_in_design`.
+    attrs : global attributes (title, summary, campaign, license, …).
     varied : for each study, its varied parameters by name: label on which the parameter depends (surface or material),
         unit, and value for each value of the label. They become coordinates.
-    attrs : global attributes of the file (title, summary, campaign, license, …).
 
     Raises
     ------
@@ -251,96 +384,30 @@ def write_campaign(
         If a run is given twice or is not in the design; if runs differ in a value that they must share; if a file
         cannot be read. The message names the run.
     """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryFile(dir=path.parent) as spool:
-        studies = arrange_runs(spool_runs(runs, spool), design)
-        with whole_file(path) as temporary, netCDF4.Dataset(temporary, "w") as file:
-            origins = [each for study in studies for each in study.origins]
-            names = [study.name for study in studies]
-            described = combine_attributes("Campaign of rough contacts", _STUDIES, COLLECTED, origins)
-            file.setncatts(described | {"comment": _ACCESS.format(", ".join(names), names[0])} | dict(attrs))
-            # Writing is faster if all variables are defined first: see icha.datasets.files.
-            groups = [
-                define_group(file.createGroup(each.name), each, attrs, varied.get(each.name, {})) for each in studies
-            ]
-            for group in groups:
-                _write(group, spool)
+    found: dict[RunLabels, _Run] = {}
+    for labels, source in runs:
+        labels = _plain(labels)
+        if labels in found:
+            raise ValueError(f"{labels}: this run is given twice")
+        found[labels] = _Run(labels, source)
+    designs: dict[str, list[RunLabels]] = {}
+    asked = dict.fromkeys(found if design is None else map(_plain, design))
+    for labels in asked:
+        designs.setdefault(labels.study, []).append(labels)
+    for labels in found:
+        if labels not in asked:
+            raise ValueError(f"{labels}: this run is not in the design")
+    studies = [_Study(name, of_study, found) for name, of_study in designs.items()]
+    groups = {f"/{study.name}": study.dataset(varied.get(study.name, {}), attrs) for study in studies}
+    origins = [each for study in studies for each in study.origins]
+    described = combine_attributes("Campaign of rough contacts", _STUDIES, COLLECTED, origins)
+    access = _ACCESS.format(", ".join(designs), next(iter(designs)))
+    return xr.DataTree.from_dict({"/": xr.Dataset(attrs=described | {"comment": access} | dict(attrs))} | groups)
 
 
-def _write(group: Group, spool: BinaryIO) -> None:
-    """Write all values of a group; `spool` is the temporary file, from which runs are read block by block."""
-    for variable, values in group.known:
-        variable[...] = values
-    along_ragged = {name for variables in group.ragged.values() for name in variables}
-    written = dict.fromkeys(group.ragged, 0)
-    shared = {
-        name: np.full(column.variable.shape, column.fill, column.variable.dtype)
-        for name, column in group.columns.items()
-        if column.along != LABELS and name not in along_ragged
-    }
-    shape, lengths = group.study.known["status"].shape, np.array(group.block)
-    placed = zip(group.study.entries, group.study.positions, strict=True)
-    for start, members in itertools.groupby(placed, key=lambda each: tuple(each[1] // lengths * lengths)):
-        box = tuple(slice(k, min(k + n, size)) for k, n, size in zip(start, lengths, shape, strict=True))
-        sides = [side.stop - side.start for side in box]
-        block = {
-            name: np.full((*sides, *column.variable.shape[len(LABELS) :]), column.fill, column.variable.dtype)
-            for name, column in group.columns.items()
-            if column.along == LABELS
-        }
-        for entry, position in members:
-            spool.seek(entry.place)
-            snapshots = [group.study.snapshots[each] for each in entry.snapshots]
-            values = {
-                name: group.columns[name].pad(v) for name, (_, v) in pickle.load(spool).items() if name in group.columns
-            }
-            for name, v in values.items():
-                column = group.columns[name]
-                slots = column.slots(snapshots, v)
-                if name in block:
-                    block[name][*(position - start), ...][slots] = v
-                elif name in shared:
-                    index = (*(position[LABELS.index(label)] for label in column.along), *slots)
-                    _put_shared(name, column, shared[name], index, v, entry.labels)
-            for dim, variables in group.ragged.items():
-                written[dim] += _write_ragged(dim, variables, written[dim], position, values, snapshots)
-        for name, values in block.items():
-            group.columns[name].variable[box] = values
-    for name, values in shared.items():
-        group.columns[name].variable[...] = values
+def write_campaign(runs: Iterable[LabelledRun], path: str | os.PathLike, **options: Any) -> None:
+    """Build a campaign dataset with the `options` of `campaign_tree`, and write it to the netCDF-4 file `path`.
 
-
-def _write_ragged(
-    dim: str,
-    variables: Mapping[str, netCDF4.Variable],
-    begin: int,
-    position: np.ndarray,
-    values: Mapping[str, np.ndarray],
-    snapshots: list[int],
-) -> int:
-    """Write the values of a run along a ragged dimension, beginning at index `begin`; return the number of values.
-
-    The spots of a run are sorted by the index of the snapshot in the file.
+    The same runs give the same bytes. Raises the errors of `campaign_tree` and `write_dataset`.
     """
-    found = {name: values[name] for name in variables if name in values}
-    count = len(next(iter(found.values()), ()))
-    found |= {f"{dim}_{label}": np.full(count, k) for label, k in zip(LABELS, position, strict=True)}
-    if "spot_snapshot" in found and count:
-        found["spot_snapshot"] = np.asarray(snapshots, np.int32)[found["spot_snapshot"]]
-        order = np.argsort(found["spot_snapshot"], kind="stable")
-        found = {name: v[order] for name, v in found.items()}
-    for name, v in found.items():
-        variables[name][begin : begin + count] = v
-    return count
-
-
-def _put_shared(name: str, column: Column, known: np.ndarray, index: tuple, values: np.ndarray, run: RunLabels) -> None:
-    """Store the values of a variable that is the same for several runs; raise ValueError if an earlier run differs."""
-    present = known[index]
-    unknown = present == column.fill
-    equal = present == values if values.dtype.kind == "S" else np.isclose(present, values, rtol=_SAME, atol=0)
-    if not np.all(unknown | equal):
-        shared = ", ".join(column.along) or "the study"
-        raise ValueError(f"{run}: {name} differs between runs that share {shared}; expected equal values")
-    known[index] = np.where(unknown, values, present)
+    write_dataset(campaign_tree(runs, **options), path)

@@ -9,25 +9,28 @@ writing variables. Therefore ICHA defines all variables before it writes the fir
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Collection, Container, Hashable, Iterator, Mapping
+from collections.abc import Container, Hashable, Iterator
 from contextlib import contextmanager
 
 import netCDF4
 import numpy as np
 import xarray as xr
 
-from icha.datasets.results import COMPRESSED_SIZES, COMPRESSION, LEFT_IN_FILE
+from icha.datasets.results import COMPRESSION, LEAST_COMPRESSED, LEAST_PLAIN_HEIGHTS, LEFT_IN_FILE, VALUES_IN_CHUNK
 from icha.datasets.variables.campaign import COMPLETE
 from icha.datasets.variables.run import CELLS
 from icha.datasets.variables.terms import is_refused
 from icha.support.atomic_files import whole_file
 
-FLOAT_FILL = 9.969209968386869e36
-INTEGER_FILL = -(2**31) + 1
+_FLOAT_FILL = 9.969209968386869e36
+_INTEGER_FILL = -(2**31) + 1
+# Dimensions of the heights of a surface.
+HEIGHTS = ("y", "x")
 # With this attribute, xarray recognises text that is stored as characters. Every netCDF tool reads characters. Unlike
 # strings of variable length, characters can be compressed.
-TEXT = {"_Encoding": "utf-8"}
+_TEXT = {"_Encoding": "utf-8"}
 
 
 def write_dataset(data: xr.Dataset | xr.DataTree, path: str | os.PathLike) -> None:
@@ -50,40 +53,58 @@ def write_dataset(data: xr.Dataset | xr.DataTree, path: str | os.PathLike) -> No
         # Every variable is written completely, so filling it with missing values first would waste time.
         file.set_fill_off()
         defined = [
-            variable
+            each
             for group, dataset in nodes.items()
-            for variable in _define(file if group == "/" else file.createGroup(group), dataset)
+            for each in _define(file if group == "/" else file.createGroup(group), dataset)
         ]
-        for variable, values in defined:
-            variable[...] = values
+        for variable, values, fill in defined:
+            variable[...] = values if fill is None else np.where(np.isnan(values), fill, values).astype(variable.dtype)
 
 
-def _define(group: netCDF4.Dataset, dataset: xr.Dataset) -> list[tuple[netCDF4.Variable, np.ndarray]]:
-    """Define the dimensions and variables of a dataset in a group of a file; return each variable and its values."""
-    define_dimensions(group, dataset.sizes)
+def _define(
+    group: netCDF4.Dataset, dataset: xr.Dataset
+) -> Iterator[tuple[netCDF4.Variable, np.ndarray, float | int | None]]:
+    """Define the dimensions and variables of a dataset in a group of a file.
+
+    Yields each variable, its values, and the number that replaces missing values; None if no value is missing.
+    """
+    for dim, size in dataset.sizes.items():
+        group.createDimension(dim, size)
     group.setncatts(dataset.attrs)
-    coordinates = coordinates_of(dataset.variables, dataset.coords)
-    defined = []
+    coordinates = _coordinates_of(dataset)
     for name, variable in dataset.variables.items():
+        dims, values, dtype, fill = variable.dims, variable.values, variable.dtype, None
         attrs = variable.attrs | ({"coordinates": coordinates[name]} if name in coordinates else {})
-        if is_text(variable.dtype):
-            values = characters(variable.values)
-            width = values.shape[-1]
-            defined.append((define_variable(group, name, variable.dims, values.dtype, attrs, width), values))
-            continue
-        values, storage = variable.values, {}
-        if variable.dtype.kind == "f" and np.isnan(values).any():
-            is_integer = variable.encoding.get("dtype") == np.dtype("int32")
-            fill = storage["fill_value"] = INTEGER_FILL if is_integer else FLOAT_FILL
-            values = np.where(np.isnan(values), fill, values)
-            values = values.astype(np.int32) if is_integer else values
-        if variable.dims[-2:] == CELLS:
-            # Each map is one chunk, because maps are read one by one. Maps are compressed, since most values are zero.
-            storage |= COMPRESSION | {"chunksizes": (*[1] * (variable.ndim - 2), *variable.shape[-2:])}
-        elif variable.size in COMPRESSED_SIZES:
-            storage |= COMPRESSION
-        defined.append((define_variable(group, name, variable.dims, values.dtype, attrs, **storage), values))
-    return defined
+        if is_text(dtype):
+            values, attrs = _characters(values), attrs | _TEXT
+            dims, dtype = (*dims, f"string{values.shape[-1]}"), values.dtype
+            if dims[-1] not in group.dimensions:
+                group.createDimension(dims[-1], values.shape[-1])
+        elif dtype.kind == "f" and np.isnan(values).any():
+            fill = _FLOAT_FILL
+            if variable.encoding.get("dtype") == np.dtype("int32"):
+                dtype, fill = np.dtype(np.int32), _INTEGER_FILL
+        defined = group.createVariable(name, dtype, dims, fill_value=fill, **_storage(dims, values.shape))
+        defined.setncatts(attrs)
+        # The netCDF library must not convert the values.
+        defined.set_auto_maskandscale(False)
+        defined.set_auto_chartostring(False)
+        yield defined, values, fill
+
+
+def _storage(dims: tuple[Hashable, ...], shape: tuple[int, ...]) -> dict:
+    """Return the storage options of an array: whether it is compressed, and the shape of its chunks."""
+    if dims[-2:] == CELLS:
+        # Each map is one chunk, because maps are read one by one. Maps are compressed, since most values are zero.
+        return COMPRESSION | {"chunksizes": (*[1] * (len(shape) - 2), *shape[-2:])}
+    size = math.prod(shape)
+    if size < LEAST_COMPRESSED or (dims == HEIGHTS and size >= LEAST_PLAIN_HEIGHTS):
+        return {}
+    chunk, left = [], VALUES_IN_CHUNK
+    for length in reversed(shape):
+        chunk.append(max(1, min(length, left)))
+        left //= length
+    return COMPRESSION | {"chunksizes": tuple(reversed(chunk))}
 
 
 def _refuse_values_not_finite(dataset: xr.Dataset, where: str) -> None:
@@ -175,36 +196,15 @@ def is_text(dtype: np.dtype) -> bool:
     return dtype.kind in "OUTS"
 
 
-def characters(texts: np.ndarray) -> np.ndarray:
+def encode_texts(texts: np.ndarray) -> np.ndarray:
+    """Encode texts as bytes (UTF-8) of equal length, with zeros after the end of shorter texts."""
+    return np.char.encode(np.asarray(texts).astype("U"), "utf-8")
+
+
+def _characters(texts: np.ndarray) -> np.ndarray:
     """Encode texts as arrays of characters (UTF-8); the added last dimension has the length of the longest text."""
-    texts = np.asarray(texts)
-    encoded = np.ascontiguousarray(np.char.encode(texts.astype("U"), "utf-8"))
-    return encoded.view("S1").reshape(*texts.shape, max(encoded.dtype.itemsize, 1))
-
-
-def define_dimensions(group: netCDF4.Dataset, sizes: Mapping[Hashable, int]) -> None:
-    """Define the dimensions of a group of a netCDF file; `sizes` are sizes by name of the dimension."""
-    for name, size in sizes.items():
-        group.createDimension(name, size)
-
-
-def define_variable(
-    group: netCDF4.Dataset, name: str, dims: tuple[str, ...], dtype: np.dtype, attrs: Mapping, width=0, **storage
-) -> netCDF4.Variable:
-    """Define a variable of numbers, or of texts of at most `width` bytes, which are stored as characters.
-
-    `storage` are options of `netCDF4.Dataset.createVariable`.
-    """
-    if width:
-        dims, attrs = (*dims, f"string{width}"), {**attrs, **TEXT}
-        if dims[-1] not in group.dimensions:
-            group.createDimension(dims[-1], width)
-    variable = group.createVariable(name, dtype, dims, **storage)
-    variable.setncatts(dict(attrs))
-    # The netCDF library must not convert the values.
-    variable.set_auto_maskandscale(False)
-    variable.set_auto_chartostring(False)
-    return variable
+    encoded = np.ascontiguousarray(encode_texts(texts))
+    return encoded.view("S1").reshape(*np.shape(texts), max(encoded.dtype.itemsize, 1))
 
 
 def not_finite(name: Hashable, dims: tuple[Hashable, ...], bad: np.ndarray) -> str:
@@ -214,25 +214,15 @@ def not_finite(name: Hashable, dims: tuple[Hashable, ...], bad: np.ndarray) -> s
     return f"{text}, the first at {first}" if first else text
 
 
-def coordinates_of(
-    variables: Mapping[Hashable, xr.Variable],
-    coordinates: Collection[Hashable],
-    dims: Mapping[Hashable, tuple[Hashable, ...]] = {},
-) -> dict[Hashable, str]:
-    """Return the CF attribute `coordinates` for each variable that has coordinates besides those of its dimensions.
-
-    Parameters
-    ----------
-    variables : all variables of a group, by name. Bounds of coordinates do not get the attribute.
-    coordinates : names of the variables that are coordinates.
-    dims : dimensions in the file by name of the variable, for variables with other dimensions in the file.
-    """
-    dims = {name: variable.dims for name, variable in variables.items()} | dict(dims)
-    without = {*coordinates, *(variable.attrs.get("bounds") for variable in variables.values())}
-    auxiliary = sorted(name for name in coordinates if dims[name] != (name,))
+def _coordinates_of(dataset: xr.Dataset) -> dict[Hashable, str]:
+    """Return the CF attribute `coordinates` for each variable that has coordinates besides those of its dimensions."""
+    variables = dataset.variables
+    # Bounds of coordinates do not get the attribute.
+    without = {*dataset.coords, *(variable.attrs.get("bounds") for variable in variables.values())}
+    auxiliary = sorted(name for name in dataset.coords if variables[name].dims != (name,))
     found = {
-        name: " ".join(each for each in auxiliary if set(dims[each]) <= set(dims[name]))
-        for name in dims
+        name: " ".join(each for each in auxiliary if set(variables[each].dims) <= set(variable.dims))
+        for name, variable in variables.items()
         if name not in without
     }
     return {name: text for name, text in found.items() if text}

@@ -28,9 +28,11 @@ DEPOSIT = "publish/{campaign}-{version}"
 # Arrays with fewer values are not compressed, because the chunks of a compressed array would need as much space as
 # compression saves (docs/reference/dataset.md, "Compression").
 LEAST_COMPRESSED = 1024
-# Arrays are compressed if their number of values is in this range. Larger arrays are heights. Compression of heights
-# would save only a sixth of the space, and take 13 s for 8192 x 8192 nodes.
-COMPRESSED_SIZES = range(LEAST_COMPRESSED, 2**22)
+# Heights of surfaces with this number of nodes or more are not compressed. Compression would save only a sixth of the
+# space, and take 13 s for 8192 x 8192 nodes.
+LEAST_PLAIN_HEIGHTS = 2**22
+# A chunk of a compressed array has at most this number of values.
+VALUES_IN_CHUNK = 2**18
 COMPRESSION = {"zlib": True, "complevel": 4, "shuffle": True}
 # An array of a campaign dataset is read as a whole if its size in bytes is at most this number.
 LEFT_IN_FILE = 2**26

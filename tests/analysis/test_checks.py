@@ -16,7 +16,8 @@ from icha.analysis.checks import (
 from icha.checks.findings import Check, RunArrays
 from icha.checks.loops import count_unshared_separations, work_error
 from icha.checks.run import check_run
-from icha.datasets.campaign import campaign_tree, run_labels
+from icha.datasets.campaign import run_labels
+from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import RunLabels
 from validation.surfaces import paraboloid
 

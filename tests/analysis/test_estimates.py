@@ -14,7 +14,7 @@ import xarray as xr
 from icha.analysis import control_variates
 from icha.analysis.answers import answers_of, as_csv, as_latex, paragraph
 from icha.analysis.estimates import estimate_campaign
-from icha.datasets.campaign import campaign_tree
+from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import RunLabels, coarse_study
 
 COARSE, FINE = 1.3, 1.25

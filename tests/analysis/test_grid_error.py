@@ -21,7 +21,7 @@ from icha.analysis.grid_error import (
     error_beyond,
 )
 from icha.analysis.validity import statements_on_dataset
-from icha.datasets.campaign import campaign_tree
+from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import RunLabels
 from icha.figures import fig13_loops, fig14_pull_off, fig15_loss
 from icha.figures.captions import caption_of, sentence_on_loops

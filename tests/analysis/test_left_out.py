@@ -22,7 +22,8 @@ from icha.analysis.left_out import (
 from icha.analysis.sample_words import sample_rows, sample_table
 from icha.analysis.sensitivity import sensitivity_of_campaign
 from icha.checks.run import attributes_of_failure, check_run
-from icha.datasets.campaign import campaign_tree, select_run
+from icha.datasets.campaign import select_run
+from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import RunLabels
 from icha.datasets.table import tidy_table
 from icha.figures import fig14_pull_off, fig15_loss, fig21_sensitivity, fig22_parameters

@@ -30,7 +30,8 @@ from icha.analysis.model_error import (
 )
 from icha.contact.attraction import FINITE_RANGE, NO_ATTRACTION, SHORT_RANGE
 from icha.contact.model import GAP_BINS, PRESSURE_BINS
-from icha.datasets.campaign import campaign_tree, find_snapshot
+from icha.datasets.campaign import find_snapshot
+from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import read_campaign, write_dataset
 from icha.datasets.labels import RunLabels
 from icha.datasets.variables.campaign import COMPLETE, INCOMPLETE

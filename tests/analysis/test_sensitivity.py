@@ -10,7 +10,7 @@ from sampled_cases import COUNT, sampled
 from icha.analysis.estimates import estimate_campaign
 from icha.analysis.sample_words import distribution_words, sample_rows, sample_table
 from icha.analysis.sensitivity import sensitivity_of_campaign
-from icha.datasets.campaign import campaign_tree
+from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import inputs_study
 from icha.figures import fig21_sensitivity, fig22_parameters
 

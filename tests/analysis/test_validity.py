@@ -18,7 +18,7 @@ from icha.analysis.validity import (
     statements_on_dataset,
 )
 from icha.configuration.load import load_configuration
-from icha.datasets.campaign import campaign_tree
+from icha.datasets.campaign_file import campaign_tree
 from icha.planning.validity import surface_facts
 from icha.surfaces.moments import height_statistics, slope_anisotropy, spectral_moments
 from icha.surfaces.resolution import Resolution, resolution_of

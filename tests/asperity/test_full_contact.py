@@ -11,7 +11,8 @@ import icha
 from icha.asperity.full_contact import full_contact_energy_ratio, gaussian_complete_pressure
 from icha.asperity.material import Material
 from icha.asperity.stickiness import sticky_rms_height
-from icha.datasets.campaign import campaign_tree, select_run
+from icha.datasets.campaign import select_run
+from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import read_run, write_dataset
 from icha.datasets.format import RUN, problems_with_file
 from icha.surfaces.moments import self_affine_full_contact_energy

@@ -25,7 +25,7 @@ from icha.analysis.sensitivity import sensitivity_of_campaign
 from icha.configuration.campaign import Campaign
 from icha.configuration.cases import run_cases
 from icha.configuration.load import load_configuration
-from icha.datasets.campaign import campaign_tree
+from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import read_campaign, write_dataset
 from icha.datasets.table import as_csv, tidy_table
 

@@ -14,7 +14,7 @@ from matplotlib.colors import to_hex, to_rgb
 
 import icha
 from icha.analysis.model_error import jaccard
-from icha.datasets.campaign import campaign_tree
+from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import read_dataset, write_dataset
 from icha.datasets.labels import RunLabels
 from icha.datasets.surface_file import write_surface

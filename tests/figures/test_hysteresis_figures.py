@@ -9,7 +9,7 @@ from drawn import legend
 from matplotlib.colors import to_hex
 
 from icha.contact.models import REFERENCE_MODEL
-from icha.datasets.campaign import campaign_tree
+from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import RunLabels
 from icha.figures import fig13_loops, fig14_pull_off, fig15_loss, fig16_snap_map
 from icha.figures.captions import caption_of, texts_of

@@ -10,7 +10,7 @@ import icha
 from icha.analysis.validity import statements_on_dataset
 from icha.asperity.tabor import SHORT_RANGE_FROM
 from icha.cli import app
-from icha.datasets.campaign import campaign_tree
+from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import write_dataset
 from icha.datasets.labels import RunLabels
 from icha.figures import (

@@ -6,7 +6,7 @@ import pytest
 import small_campaign as small
 from drawn import legend, lines_of
 
-from icha.datasets.campaign import campaign_tree
+from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import RunLabels
 from icha.figures import (
     fig2_area_and_gap,

@@ -14,8 +14,8 @@ from icha.analysis.common_loads import compare_runs
 from icha.analysis.model_error import model_error
 from icha.checks.run import check_run
 from icha.contact.models import DEFAULT_MODEL, MODELS, REFERENCE_MODEL
-from icha.datasets.campaign import campaign_tree, run_labels, select_run
-from icha.datasets.campaign_file import write_campaign
+from icha.datasets.campaign import run_labels, select_run
+from icha.datasets.campaign_file import campaign_tree, write_campaign
 from icha.datasets.files import read_campaign, write_dataset
 from icha.datasets.format import CAMPAIGN, RUN, identify_file, problems_with_file
 from icha.datasets.labels import LABELS, RunLabels

@@ -13,7 +13,7 @@ import tiny_campaign
 import yaml
 from conftest import REPOSITORY
 
-from icha.datasets.campaign import campaign_tree
+from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import write_dataset
 from icha.deposit.program import locked_versions
 

@@ -8,7 +8,7 @@ import own_slopes_campaign as crops
 import pytest
 
 from icha.contact.models import DEFAULT_MODEL, MODELS, REFERENCE_MODEL
-from icha.datasets.campaign import campaign_tree
+from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import write_dataset
 from icha.planning import costs
 from icha.surfaces.moments import self_affine_moments, summit_density

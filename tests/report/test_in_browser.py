@@ -12,7 +12,7 @@ from explorer_results import write_results
 from PIL import Image
 
 from icha.analysis.checks import check_campaign
-from icha.datasets.campaign import campaign_tree
+from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.surface_file import write_surface
 from icha.figures import fig1_jkr, fig2_area_and_gap
 from icha.figures.style import save

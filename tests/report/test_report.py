@@ -15,7 +15,7 @@ from scipy.stats import t
 from icha.analysis.checks import check_campaign
 from icha.analysis.common_loads import compare_campaign, compare_runs, interpolate
 from icha.checks.findings import Check
-from icha.datasets.campaign import campaign_tree
+from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import read_campaign, read_dataset, write_dataset
 from icha.datasets.labels import RunLabels
 from icha.datasets.surface_file import write_surface

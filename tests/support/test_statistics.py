@@ -6,7 +6,8 @@ import small_campaign as small
 import xarray as xr
 
 from icha.analysis.common_loads import at_common_loads, compare_runs
-from icha.datasets.campaign import campaign_tree, reduced_gap
+from icha.datasets.campaign import reduced_gap
+from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import LABELS, RunLabels
 from icha.support.statistics import ensemble
 

@@ -8,7 +8,8 @@ import pytest
 import small_campaign as small
 
 from icha.analysis.checks import check_campaign, read_checks
-from icha.datasets.campaign import campaign_tree, select_run
+from icha.datasets.campaign import select_run
+from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import read_campaign, read_dataset, read_run, write_dataset
 from icha.datasets.format import RUN, problems_with_file
 from icha.datasets.labels import RunLabels

@@ -10,7 +10,7 @@ from icha.analysis.common_loads import compare_runs
 from icha.asperity.material import Material
 from icha.configuration.cases import run_cases, run_settings, surface_settings
 from icha.configuration.load import load_configuration
-from icha.datasets.campaign import campaign_tree
+from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import RunLabels
 from icha.datasets.surface_file import read_scaled_surface
 from icha.path.targets import Path
