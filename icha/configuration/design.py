@@ -1,8 +1,8 @@
 """Expand each study of a campaign into runs: combinations of surfaces, seeds, slopes and materials.
 
-A study runs all combinations of the entries of its lists. But the lists of one group in the key `zip` are combined
-entry by entry. A value in `cases` replaces the list of the same parameter. Each combination of varied parameters
-defines a new surface or material, called a variant, with a name such as `rough-hurst0.6`.
+A study runs all combinations of the entries of its lists. A value in `cases` replaces the list of the same parameter.
+Each combination of varied parameters defines a new surface or material, called a variant, with a name such as
+`rough-hurst0.6`.
 """
 
 import hashlib
@@ -30,8 +30,6 @@ MAX_RUNS = 100_000
 _MAX_TARGETS = 5_000_000
 # Keys of the lists of a study, and the corresponding keys of a case.
 _LISTS = {"surfaces": "surface", "seeds": "seed", "rms_slopes": "rms_slope", "materials": "material"}
-# Keys of lists in the key `zip`.
-_ZIPPED = _LISTS | {"rms_heights": "rms_slope"}
 # Order of the lists of a study. The last list changes fastest from run to run.
 _OF_MATERIAL = MaterialSection.model_fields
 _ORDER = ("surface", *(name for name in SCALARS if name not in _OF_MATERIAL), "seed", "rms_slope", "material")
@@ -136,12 +134,9 @@ def _points(label: str, study: Study) -> Iterator[dict[str, _Located]]:
         fixed = {name: (("studies", label, *place, name), value) for name, value in given.items()}
         if sampled:
             fixed[_CASE] = ("studies", label, "sample"), f"{label}-case{index}"
-        axes = [
-            [dict(zip(group, values, strict=True)) for values in zip(*(lists[name] for name in group), strict=True)]
-            for group in _axes(study, lists, fixed)
-        ]
-        for chosen in itertools.product(*axes):
-            yield fixed | {name: located for values in chosen for name, located in values.items()}
+        free = [name for name in lists if name not in fixed]
+        for chosen in itertools.product(*(lists[name] for name in free)):
+            yield fixed | dict(zip(free, chosen, strict=True))
 
 
 def _cases(study: Study) -> list[dict[str, Any]]:
@@ -149,18 +144,6 @@ def _cases(study: Study) -> list[dict[str, Any]]:
     if study.sample is not None:
         return study.sample.cases
     return [{}] if study.cases is None else [case.model_dump(exclude_none=True) for case in study.cases]
-
-
-def _axes(study: Study, lists: Mapping, fixed: Mapping) -> Iterator[list[str]]:
-    """Yield groups of lists. The lists of one group are combined entry by entry, and different groups in all ways."""
-    groups = [[_ZIPPED.get(name, name) for name in group] for group in study.zip]
-    done = set(fixed)
-    for name in lists:
-        if name not in done:
-            group = next((group for group in groups if name in group), [name])
-            group = [each for each in group if each not in fixed]
-            done |= set(group)
-            yield group
 
 
 def _too_many_runs(campaign: Campaign) -> Iterator[Problem]:
@@ -181,7 +164,7 @@ def _excess(section: str, count: int, what: str, most: int) -> Iterator[Problem]
 def _run_count(label: str, study: Study) -> int:
     """Count the runs of a study with all its models. A run that occurs twice counts twice."""
     lists = _lists(label, study)
-    counts = (math.prod(len(lists[group[0]]) for group in _axes(study, lists, given)) for given in _cases(study))
+    counts = (math.prod(len(lists[name]) for name in lists if name not in given) for given in _cases(study))
     return len(study.models) * sum(counts)
 
 
@@ -212,7 +195,6 @@ def _study_problems(campaign: Campaign, label: str, study: Study) -> Iterator[Pr
         for location, name in values(one):
             if name not in names:
                 yield location, name, f"is not defined; expected one of {list_names(names)}"
-    yield from _zip_problems(prefix, study, lists)
     if study.sample is not None:
         yield from _sample_problems(prefix, study)
     if is_derived_study(label, campaign.studies):
@@ -240,7 +222,7 @@ def _samples_slopes(study):
 
 def _sample_problems(prefix, study):
     """Yield the problems of the key `sample` of a study."""
-    for key in ("vary", "zip", "cases"):
+    for key in ("vary", "cases"):
         if getattr(study, key):
             reason = "is given beside `sample`; expected one of both. Remove the key, or use separate studies"
             yield (*prefix, key), NOTHING, reason
@@ -283,26 +265,6 @@ def _level_problems(campaign, label, study, surfaces):
 def _key_of_levels(study):
     """Return the name of the key of a study that determines its levels."""
     return "accuracy" if study.levels is None else "levels"
-
-
-def _zip_problems(prefix, study, lists) -> Iterator[Problem]:
-    seen = set()
-    plural = {one: many for many, one in _LISTS.items()}
-    expected = ", ".join(plural.get(each, each) for each in lists)
-    for index, group in enumerate(study.zip):
-        lengths = {}
-        for position, name in enumerate(group):
-            location, one = (*prefix, "zip", index, position), _ZIPPED.get(name, name)
-            if name in plural or one not in lists:
-                yield location, name, f"is not a list of this study; expected one of {expected}"
-                continue
-            if one in seen:
-                yield location, name, "is in two groups; expected each list in at most one group"
-            seen.add(one)
-            lengths[name] = len(lists[one])
-        if len(set(lengths.values())) > 1:
-            counts = ", ".join(f"{name} has {length}" for name, length in lengths.items())
-            yield (*prefix, "zip", index), group, f"{counts} entries; expected lists of the same length"
 
 
 class _Variants:

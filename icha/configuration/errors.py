@@ -18,11 +18,6 @@ from icha.support.values import NAME_PATTERN, NOTHING, Problem
 
 # Largest number of problems in one message.
 MOST_PROBLEMS = 50
-# Messages for keys that were renamed or removed, by section and key.
-_FORMER_KEYS = {
-    ("Study", "united_until"): "was removed, because coalesced spots now split when their parts would no longer "
-    "overlap. Remove the key",
-}
 # Usual words for quantities that have another key here: keys, of which one exists in the section or in a study; words;
 # and how the quantities are related. The relations to the correlation length follow from the spectrum with roll-off:
 # docs/faq.md. Those of Ra and Rdq hold for Gaussian heights and for isotropic surfaces (ISO 21920-2, ISO 25178-2).
@@ -137,8 +132,6 @@ def _reason_for_key(kind: str, location: tuple) -> str:
     section, name = _section_at(location[:-1]), location[-1]
     if kind == "missing":
         return f"the key is missing; expected: {' '.join(str(section.model_fields[name].description).split())}"
-    if reason := _FORMER_KEYS.get((section.__name__, name)):
-        return reason
     return f"unknown key{_hint(str(name), section)}; expected one of {', '.join(sorted(section.model_fields))}"
 
 

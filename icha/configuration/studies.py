@@ -51,7 +51,6 @@ from icha.support.values import (
     Section,
     Seed,
     Seeds,
-    Text,
     decreasing,
     distinct,
     exactly_one,
@@ -295,15 +294,12 @@ class Study(Section):
     """Names of materials."""
     vary: Vary | None = None
     """Values of parameters of surfaces and materials. The study runs all combinations of these values."""
-    zip: list[Annotated[list[Text], Field(min_length=2)]] = []
-    """Groups of lists that are combined entry by entry (first with first, second with second) instead of in all
-    combinations. Example: `[[rms_slopes, surface_energy]]`."""
     cases: Annotated[list[Case], Field(min_length=1)] | None = None
     """Explicit list of runs, instead of all combinations. If a case has no value for a parameter, the parameter takes
     all values of the study."""
     sample: Sample | None = None
-    """Cases whose parameters are drawn from distributions, instead of `vary`, `zip` and `cases`. ICHA computes which
-    share of the variance each parameter causes. The study needs one surface, one material and one rms slope."""
+    """Cases whose parameters are drawn from distributions, instead of `vary` and `cases`. ICHA computes which share of
+    the variance each parameter causes. The study needs one surface, one material and one rms slope."""
     models: Annotated[list[Literal[tuple(MODELS)]], Field(min_length=1), AfterValidator(distinct)] = [DEFAULT_MODEL]
     """Contact models of every run. `asperities` is fast. `boundary_elements` has the `interaction_range` of the
     material where the grid resolves this range, and otherwise the limit of a short range. It needs a grid with at least

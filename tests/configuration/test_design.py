@@ -1,4 +1,4 @@
-"""The runs that a study asks for: lists, what goes along together, cases, varied parameters."""
+"""The runs of a study: lists, cases, varied parameters."""
 
 import numpy as np
 import pytest
@@ -37,18 +37,6 @@ def test_parameters_are_varied_each_with_each(load):
     assert surface_settings(campaign, case.surface)["grid"] == 96
     assert run_settings(campaign, case)["material"]["surface_energy"] == 0.01
     assert run_settings(campaign, case)["material"]["contact_modulus"] == 25e6
-
-
-def test_lists_that_go_along_together(load):
-    changes = {
-        "studies.one.vary": {"hurst": [0.5, 0.9]},
-        "studies.one.zip": [["rms_slopes", "hurst"]],
-        "studies.one.seeds": "3..5",
-    }
-    expected = {(f"rough-hurst{hurst}", seed, slope) for hurst, slope in ((0.5, 0.2), (0.9, 1.0)) for seed in (3, 4, 5)}
-    cases = run_cases(load(changes).campaign)
-    assert {(case.surface, case.seed, case.rms_slope) for case in cases} == expected
-    assert len(cases) == len(expected)
 
 
 def test_an_explicit_list_of_runs(load):
@@ -119,19 +107,6 @@ def test_rms_heights_scale_surfaces_as_their_spectra_or_their_files_demand(load,
 
 def slopes_of(campaign):
     return {(case.surface, case.rms_slope) for case in run_cases(campaign)}
-
-
-def test_rms_heights_go_along_with_other_lists(load):
-    changes = {
-        "studies.one.rms_slopes": None,
-        "studies.one.rms_heights": ["100 nm", "200 nm"],
-        "studies.one.vary": {"surface_energy": ["5 mJ/m^2", "10 mJ/m^2"]},
-        "studies.one.zip": [["rms_heights", "surface_energy"]],
-        "studies.one.seeds": [1],
-    }
-    first, second = run_cases(load(changes).campaign)
-    assert second.rms_slope == pytest.approx(2 * first.rms_slope, rel=1e-5)
-    assert (first.material, second.material) == ("soft-surface_energy5mJ", "soft-surface_energy10mJ")
 
 
 def test_bodies_give_the_contact_modulus_and_the_ratio_of_a_layer(load):
