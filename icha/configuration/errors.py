@@ -1,11 +1,13 @@
-"""Error messages for configurations: file, key, value, problem and expected value."""
+"""Error messages for configurations: file, line, key, value, problem and expected value."""
+
+from __future__ import annotations
 
 import difflib
 import itertools
 import re
 from collections.abc import Iterable, Mapping
 from types import UnionType
-from typing import Annotated, Any, Union, get_args, get_origin
+from typing import TYPE_CHECKING, Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel
 
@@ -15,6 +17,9 @@ from icha.configuration.surfaces import SURFACE_KINDS
 from icha.figures.own_figure import OwnFigure
 from icha.support.formatting import printable
 from icha.support.values import NAME_PATTERN, NOTHING, Problem
+
+if TYPE_CHECKING:
+    from icha.configuration.yaml_files import Source
 
 # Largest number of problems in one message.
 MOST_PROBLEMS = 50
@@ -76,24 +81,25 @@ class ConfigurationError(ValueError):
     """Error: a configuration is not valid. The message has one line for each problem."""
 
 
-def refuse(origin: str, problems: Iterable[Problem], implausible: Iterable[Problem] = ()) -> None:
+def refuse(source: Source, problems: Iterable[Problem], implausible: Iterable[Problem] = ()) -> None:
     """Raise ConfigurationError if there are problems; the message first lists implausible values as possible causes."""
     found = list(itertools.islice(problems, MOST_PROBLEMS + 1))
     if not found:
         return
     found = [*itertools.islice(implausible, MOST_PROBLEMS + 1), *found]
-    lines = list(dict.fromkeys(format_problem(origin, *problem) for problem in found))
+    lines = list(dict.fromkeys(format_problem(source, *problem) for problem in found))
     if len(lines) > MOST_PROBLEMS:
-        lines[MOST_PROBLEMS:] = [f"{origin}: there are more problems; correct these first"]
+        lines[MOST_PROBLEMS:] = [f"{source.name}: there are more problems; correct these first"]
     raise ConfigurationError("\n".join(lines))
 
 
-def format_problem(origin: str, location: tuple, value: Any, reason: str) -> str:
+def format_problem(source: Source, location: tuple, value: Any, reason: str) -> str:
     """Format a problem as one line; escape control characters, because the file may come from an unknown source."""
+    where, location, value = source.locate(location, value)
     keys = [f"[{entry}]" if isinstance(entry, int) else f".{_cut(str(entry), 80)}" for entry in location]
     key = "".join(keys).lstrip(".") or "top level"
     shown = "" if value is NOTHING else " (empty)" if value is None else f" {_cut(repr(value), 80)}"
-    return printable(f"{origin}: {key}:{shown} {_cut(reason, 2000)}")
+    return printable(f"{where}: {key}:{shown} {_cut(reason, 2000)}")
 
 
 def _cut(text: str, most: int) -> str:

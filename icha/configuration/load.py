@@ -16,6 +16,7 @@ from icha.configuration.design import expand_design
 from icha.configuration.errors import ConfigurationError, format_problem, problem_of, refuse
 from icha.configuration.plausibility import (
     CONFIRMED,
+    Unusual,
     coarse_contacts,
     coarse_grids,
     long_ranges,
@@ -30,12 +31,12 @@ from icha.configuration.plausibility import (
 from icha.configuration.studies import PILOT, Study
 from icha.configuration.topographies import inspect_topographies
 from icha.configuration.yaml_files import (
+    Source,
     apply_defaults,
-    as_written,
     dump_yaml,
     excessive_size,
-    location_in_defaults,
     merge,
+    read_source,
     read_yaml,
 )
 from icha.datasets.results import CHOSEN_LEVELS
@@ -85,20 +86,20 @@ def load_configuration(
     ConfigurationError
         If a key or file is wrong; the message has a line for each problem.
     """
-    path = Path(path)
-    written = merge(read_yaml(path), overrides or {})
+    source = read_source(Path(path), overrides or {})
     if results is not None:
-        written = _with_chosen_levels(written, Path(results))
-    return _load(path, f"{path} with --config" if overrides else str(path), written, within)
+        source = replace(source, content=_with_chosen_levels(source.content, Path(results)))
+    return _load(source, within)
 
 
-def _load(path: Path, origin: str, written: Mapping, within: str | os.PathLike | None) -> Configuration:
+def _load(source: Source, within: str | os.PathLike | None) -> Configuration:
     """Check a configuration and the files that it names."""
-    campaign, unusual = _check_text(path, origin, written), unusual_values(written)
-    text, confirmed = dump_yaml(written, origin), written.get(CONFIRMED)
-    refuse(origin, _files_outside(campaign, within) if within is not None else ())
+    unusual = unusual_values(source.content)
+    campaign = _check_text(source, unusual)
+    text, confirmed = dump_yaml(source.content, source.name), source.content.get(CONFIRMED)
+    refuse(source, _files_outside(campaign, within) if within is not None else ())
     topographies, unread = inspect_topographies(campaign)
-    refuse(origin, itertools.chain(unread, campaign.file_problems()))
+    refuse(source, itertools.chain(unread, campaign.file_problems()))
     campaign = campaign.with_topographies(topographies)
     for name, each in topographies.items():
         location = "surfaces", campaign.origin("surfaces", name)
@@ -112,11 +113,11 @@ def _load(path: Path, origin: str, written: Mapping, within: str | os.PathLike |
     sticky = list(sticky_runs(campaign))
     if too_sticky := [each for each in sticky if _chooses_levels(campaign.studies[each.location[1]])]:
         levels = {each.location[1]: {"levels": _WITHOUT_ASPERITIES} for each in too_sticky}
-        found = _load(path, origin, merge(written, {"studies": levels}), within)
+        found = _load(replace(source, content=merge(source.content, {"studies": levels})), within)
         reason = "is not reached with the asperity model, because {}; boundary elements alone give the estimate"
         notes = [
             format_problem(
-                origin, (*each.location[:2], "accuracy"), NOTHING, reason.format(f"{each.value}{each.source}")
+                source, (*each.location[:2], "accuracy"), NOTHING, reason.format(f"{each.value}{each.source}")
             )
             for each in too_sticky
         ]
@@ -125,12 +126,12 @@ def _load(path: Path, origin: str, written: Mapping, within: str | os.PathLike |
     caused = [*sticky, *coarse_contacts(campaign), *long_ranges(campaign)]
     implausible = list(plausibility_problems(unusual, confirmed)) or plausibility_problems(caused, confirmed)
     unusual += caused
-    refuse(origin, itertools.chain(implausible, _located(campaign.problems(), written)))
+    refuse(source, itertools.chain(implausible, campaign.problems()))
     reason = "is unusual{}, but confirmed; expected {}"
     accepted = [
-        format_problem(origin, each.location, each.value, reason.format(each.source, each.usual)) for each in unusual
+        format_problem(source, each.location, each.value, reason.format(each.source, each.usual)) for each in unusual
     ]
-    return Configuration(campaign, text, str(path), tuple(accepted))
+    return Configuration(campaign, text, source.name, tuple(accepted))
 
 
 def _chooses_levels(study: Study) -> bool:
@@ -155,30 +156,23 @@ def _with_chosen_levels(written: dict, results: Path) -> dict:
     return merge(written, {"studies": {label: {"levels": chosen[label]} for label in asked if label in chosen}})
 
 
-def _check_text(path: Path, origin: str, written: Mapping) -> Campaign:
-    """Check the text of a configuration file and return the campaign; surfaces from files are not read."""
+def _check_text(source: Source, unusual: list[Unusual]) -> Campaign:
+    """Check the text of a configuration file and return the campaign; surfaces from files are not read.
 
-    def implausible():
-        return plausibility_problems(unusual_values(written), written.get(CONFIRMED))
-
-    content = apply_defaults(written)
+    Unusual values that are not confirmed are reported first, because they may cause the other problems.
+    """
+    implausible = list(plausibility_problems(unusual, source.content.get(CONFIRMED)))
+    content = apply_defaults(source.content)
     if excess := excessive_size(content):
-        raise ConfigurationError(f"{origin}: {excess}; expected fewer")
+        raise ConfigurationError(f"{source.name}: {excess}; expected fewer")
     try:
         campaign = Campaign.model_validate(content)
     except ValidationError as error:
-        refuse(origin, _located(map(problem_of, error.errors()), written), implausible())
-    campaign, problems = expand_design(campaign.resolve_paths(path.parent), content)
-    refuse(origin, _located(problems, written), implausible())
-    refuse(origin, itertools.chain(implausible(), _located(campaign.problems(), written)))
+        refuse(source, map(problem_of, error.errors()), implausible)
+    campaign, problems = expand_design(campaign.resolve_paths(Path(source.name).parent), content)
+    refuse(source, problems, implausible)
+    refuse(source, itertools.chain(implausible, campaign.problems()))
     return campaign
-
-
-def _located(problems, written):
-    """Yield problems with locations and quantities as in the file."""
-    for location, value, reason in problems:
-        place = location_in_defaults(location, written)
-        yield place, as_written(place, value, written), reason
 
 
 def _named_files(campaign: Campaign) -> dict[tuple[str, str], str]:

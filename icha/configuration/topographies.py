@@ -15,6 +15,7 @@ from icha.configuration.campaign import Campaign, Topography
 from icha.configuration.errors import problem_of, refuse
 from icha.configuration.studies import MEASURED
 from icha.configuration.surfaces import FileSurface, MeasuredSurface, SpectrumSurface
+from icha.configuration.yaml_files import Source
 from icha.support.checksums import sha256_of
 from icha.support.usual import IchaWarning
 from icha.support.values import NOTHING, Problem
@@ -173,20 +174,24 @@ def read_scan(path: str | os.PathLike, *, confirmed: Collection[str] = (), **key
         unusual = [each._replace(location=each.location[2:]) for each in unusual]
         return plausibility_problems(unusual, list(confirmed), "`confirmed=[{!r}]`")
 
+    source = Source("read_scan")
     section = {"kind": "measured", "path": os.fspath(path), **keywords}
     try:
         measured = MeasuredSurface.model_validate(section)
-        refuse("read_scan", unconfirmed(unusual_values({"surfaces": {"scan": section}})))
+        refuse(source, unconfirmed(unusual_values({"surfaces": {"scan": section}})))
         topography = read_topography(measured)
         surface = _with_shape(topography.surface, measured)
     except ValidationError as error:
         problems = [{**details, "loc": ("surfaces", "scan", "measured", *details["loc"])} for details in error.errors()]
-        refuse("read_scan", [(location[2:], value, reason) for location, value, reason in map(problem_of, problems)])
+        refuse(
+            source,
+            [(location[2:], value, reason) for location, value, reason in map(problem_of, problems)],
+        )
     except UnfitTopography as error:
-        refuse("read_scan", [((error.key,), section.get(error.key, NOTHING), str(error))])
+        refuse(source, [((error.key,), section.get(error.key, NOTHING), str(error))])
     repeated = repeated_height(topography.square.heights)
     unusual = unusual_topography(("surfaces", "scan"), measured, surface.period, surface.rms_slope, repeated)
-    refuse("read_scan", unconfirmed(unusual))
+    refuse(source, unconfirmed(unusual))
     if not surface.free and not edges_fit(surface.heights):
         warnings.warn(MISFIT_OF_EDGES, IchaWarning, stacklevel=2)
     if measured.outliers == "keep" and (text := defects_of(topography.square).description_of_outliers):

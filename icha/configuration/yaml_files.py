@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -18,11 +19,81 @@ from icha.support.input_files import problem_with_path
 _MOST_BYTES, _MOST_VALUES, _DEEPEST, _LONGEST_NUMBER = 10**6, 10**6, 50, 100
 
 
+@dataclass(frozen=True)
+class Source:
+    """A configuration as written, with the lines of its file.
+
+    Attributes
+    ----------
+    name : path of the file, or the name of a function whose arguments form the configuration.
+    content : values of the file and overrides, without defaults.
+    overrides : values that replace values in the file.
+    node : nodes of the YAML file, which have line numbers; None without a file.
+    """
+
+    name: str
+    content: Mapping = field(default_factory=dict)
+    overrides: Mapping = field(default_factory=dict)
+    node: yaml.Node | None = None
+
+    def locate(self, location: tuple, value: Any) -> tuple[str, tuple, Any]:
+        """Return where a value is written: file and line, keys, and the value with its unit as in the file.
+
+        A value that an entry does not have may come from the defaults of its section. If a key is missing, the line is
+        that of its section.
+        """
+        given = _descend(self.content, location)
+        defaults = ("defaults", *location[:1], *location[2:])
+        if len(given) < 3 <= len(in_defaults := _descend(self.content, defaults)):
+            location, given = defaults, in_defaults
+        if len(given) == len(location) > 0 and isinstance(value, float) and isinstance(given[-1], str):
+            value = given[-1]
+        replaced = _descend(self.overrides, location)
+        if replaced and not isinstance(replaced[-1], Mapping):
+            return f"{self.name} with --config", location, value
+        line = _line_of(self.node, location)
+        return f"{self.name}, line {line}" if line else self.name, location, value
+
+
+def _descend(content: Any, location: tuple) -> list:
+    """Return the value of each key of a location, one inside the other, up to the first key that is missing."""
+    found = []
+    for key in location:
+        in_list = isinstance(content, list) and isinstance(key, int) and key < len(content)
+        if not in_list and not (isinstance(content, Mapping) and key in content):
+            break
+        found.append(content := content[key])
+    return found
+
+
+def _line_of(node: yaml.Node | None, location: tuple) -> int:
+    """Return the line of the last key of a location that is in a YAML file; 0 if no key is in the file."""
+    line = 0
+    for key in location:
+        entries: dict = {}
+        if isinstance(node, yaml.MappingNode):
+            entries = {name.value: (name, inside) for name, inside in node.value}
+        elif isinstance(node, yaml.SequenceNode):
+            entries = {k: (inside, inside) for k, inside in enumerate(node.value)}
+        if key not in entries:
+            break
+        name, node = entries[key]
+        line = name.start_mark.line + 1
+    return line
+
+
 def read_yaml(path: Path) -> dict:
     """Read a YAML file; raise ConfigurationError if the content is not a mapping, or if a key occurs twice."""
-    text, line, problem = _read_text(path), 0, ""
+    return read_source(path).content
+
+
+def read_source(path: Path, overrides: Mapping = {}) -> Source:
+    """Read a configuration file and apply overrides; raise the errors of `read_yaml`."""
+    text, line, problem, content, node = _read_text(path), 0, "", None, None
     try:
-        content = yaml.load(text, Loader=_Loader)
+        loader = _Loader(text)
+        if (node := loader.get_single_node()) is not None:
+            content = loader.construct_document(node)
         problem = excessive_size(content)
     except yaml.reader.ReaderError as error:
         line, problem = text.count("\n", 0, error.position) + 1, f"control character {error.character:#04x}"
@@ -36,7 +107,7 @@ def read_yaml(path: Path) -> dict:
     if not isinstance(content, dict):
         what = "empty" if content is None else f"a {type(content).__name__}"
         raise ConfigurationError(f"{path}: the file is {what}; expected a YAML mapping of keys to values")
-    return content
+    return Source(str(path), merge(content, overrides), overrides, node)
 
 
 # What a message of the YAML parser means; `{}` is the line where the text or the brackets begin.
@@ -159,25 +230,17 @@ def merge(content: Mapping, overrides: Mapping) -> dict:
     return result
 
 
-def _find_defaults(content: Mapping) -> Iterator[tuple[str, Mapping, Mapping]]:
-    """Yield name, defaults and entries of every section that has defaults, if defaults and entries are mappings."""
-    defaults = content.get("defaults")
+def apply_defaults(content: Mapping) -> dict:
+    """Return `content` with default values in all entries; a surface receives only the keys of its kind."""
+    defaults, filled = content.get("defaults"), dict(content)
     for section in Defaults.model_fields if isinstance(defaults, Mapping) else ():
         given, entries = defaults.get(section), content.get(section)
         if isinstance(given, Mapping) and isinstance(entries, Mapping):
-            yield section, given, entries
-
-
-def apply_defaults(content: Mapping) -> dict:
-    """Return `content` with default values in all entries; a surface receives only the keys of its kind."""
-    filled = {
-        section: {
-            name: _fill_in(entry or {}, given) if isinstance(entry, Mapping | None) else entry
-            for name, entry in entries.items()
-        }
-        for section, given, entries in _find_defaults(content)
-    }
-    return dict(content) | filled
+            filled[section] = {
+                name: _fill_in(entry or {}, given) if isinstance(entry, Mapping | None) else entry
+                for name, entry in entries.items()
+            }
+    return filled
 
 
 def _fill_in(entry: Mapping, given: Mapping) -> dict:
@@ -191,24 +254,3 @@ def _fill_in(entry: Mapping, given: Mapping) -> dict:
     if kind and kind is not MeasuredSurface:
         others.add("boundary")
     return {key: value for key, value in given.items() if key not in others} | dict(entry)
-
-
-def as_written(location: tuple, value: Any, written: Mapping) -> Any:
-    """Return a quantity as written in the file, such as `50 kPa`, instead of its value in SI units."""
-    inside: Any = written
-    for key in location:
-        known = isinstance(inside, Mapping) and key in inside
-        if not known and not (isinstance(inside, list) and isinstance(key, int) and key < len(inside)):
-            return value
-        inside = inside[key]
-    return inside if isinstance(value, float) and isinstance(inside, str) else value
-
-
-def location_in_defaults(location: tuple, written: Mapping) -> tuple:
-    """Return the location of a value in the file: in its entry, or in the defaults of its section."""
-    for section, given, entries in _find_defaults(written):
-        if len(location) > 2 and location[0] == section:
-            entry = entries.get(location[1]) or {}
-            if location[2] in given and isinstance(entry, Mapping) and location[2] not in entry:
-                return ("defaults", section, *location[2:])
-    return location

@@ -40,7 +40,8 @@ def refused(load, tmp_path):
         with pytest.raises(ConfigurationError) as error:
             load({key: value} if key else value)
         lines = str(error.value).splitlines()
-        assert any(message in line and line.startswith(f"{tmp_path}/campaign.yaml: ") for line in lines), lines
+        assert all(re.match(rf"{tmp_path}/campaign\.yaml(, line \d+)?: ", line) for line in lines), lines
+        assert any(message in line for line in lines), lines
         assert all(re.search("expected|allowed|Remove|Use|Correct", line) for line in lines), lines
 
     return refuse

@@ -1,9 +1,10 @@
 """Files of configurations: invalid files, overrides, all problems at once."""
 
+import re
 from datetime import date
 
 import pytest
-from demo_configuration import measured_surface
+from demo_configuration import GOOD, measured_surface
 
 from icha.configuration.errors import ConfigurationError
 from icha.configuration.load import load_configuration
@@ -20,6 +21,27 @@ def test_overrides_are_checked(load):
     assert load(overrides={"surfaces": {"rough": {"hurst": 0.5}}}).campaign.surfaces["rough"].hurst == 0.5
     with pytest.raises(ConfigurationError, match=r"with --config: surfaces\.rough\.hurst: 5 is out of range"):
         load(overrides={"surfaces": {"rough": {"hurst": 5}}})
+
+
+def test_messages_name_the_line_and_the_value_as_written(tmp_path):
+    file = tmp_path / "campaign.yaml"
+    file.write_text(GOOD + "\ndefaults:\n  materials:\n    surface_energy: 1 kJ/m^2\n")
+
+    def line_of(text):
+        return 1 + next(k for k, line in enumerate(file.read_text().splitlines()) if text in line)
+
+    overrides = {"materials": {"hard": {"contact_modulus": "25 mPa", "interaction_range": "2 nm"}}}
+    overrides |= {"studies": {"one": {"targets": {"reduced_pressures": None, "pressures": ["10 GPa"]}}}}
+    with pytest.raises(ConfigurationError) as error:
+        load_configuration(file, overrides)
+    assert f"{file}, line {line_of('kJ')}: defaults.materials.surface_energy: '1 kJ/m^2' is unusual" in str(error.value)
+    assert f"{file} with --config: materials.hard.contact_modulus: '25 mPa' is unusual" in str(error.value)
+    file.write_text(GOOD.replace("hurst: 0.8", "hurts: 0.8"))
+    with pytest.raises(ConfigurationError) as error:
+        load_configuration(file)
+    wrong, missing = str(error.value).splitlines()
+    lines = {re.match(rf"{file}, line (\d+): surfaces", each)[1] for each in (wrong, missing)}
+    assert lines == {str(line_of("hurts")), str(line_of("rough:"))}
 
 
 def test_overrides_are_part_of_the_configuration_as_used(load, tmp_path):
