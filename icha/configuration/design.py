@@ -23,6 +23,7 @@ from icha.configuration.surfaces import SURFACE_KINDS, MaterialSection
 from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
 from icha.datasets.labels import coarse_study, inputs_study, is_derived_study, number_label
 from icha.path.targets import ESTIMATED_AT_TARGETS, ESTIMATED_OF_LOOPS
+from icha.support.units import PREFIXES
 from icha.support.values import LONGEST_LABEL, NOTHING, Problem, list_names, rule_of
 
 MAX_RUNS = 100_000
@@ -34,8 +35,6 @@ _LISTS = {"surfaces": "surface", "seeds": "seed", "rms_slopes": "rms_slope", "ma
 _OF_MATERIAL = MaterialSection.model_fields
 _ORDER = ("surface", *(name for name in SCALARS if name not in _OF_MATERIAL), "seed", "rms_slope", "material")
 _ORDER += tuple(_OF_MATERIAL)
-_SYMBOLS = {"m": "m", "Pa": "Pa", "J/m^2": "J"}
-_PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
 # Name under which a point of a sample has the name of its case. The case is part of the names of its variants, because
 # names with the values of all parameters would be long.
@@ -365,12 +364,11 @@ def value_label(section, name: str) -> str:
     rule = rule_of(type(section).model_fields[name])
     if rule is None or rule.unit == "1":
         return number_label(value)
-    unit = rule.unit
     exact = Decimal(repr(value))
     power = 3 * (exact.adjusted() // 3) if exact else 0
-    power = min(max(power, min(_PREFIXES)), max(_PREFIXES))
+    power = min(max(power, min(PREFIXES)), max(PREFIXES))
     digits = format(exact.scaleb(-power).normalize(), "f")
-    return f"{digits}{_PREFIXES[power]}{_SYMBOLS[unit]}"
+    return f"{digits}{PREFIXES[power].replace('µ', 'u')}{rule.unit.split('/')[0]}"
 
 
 def varied_values(campaign: Campaign) -> dict[str, dict[str, tuple[str, str, dict]]]:

@@ -13,7 +13,8 @@ from icha.figures.own_figure import OwnFigure, caption_in, modules_of
 from icha.figures.registry import DECLARATIONS, figure_number
 from icha.support.formatting import format_quantity
 from icha.support.titles import contradicting_unit, problem_with_numbers
-from icha.support.values import NOTHING, File, Name, Positive, Problem, Section, Text, conversion_factor, unknown
+from icha.support.units import conversion_factor
+from icha.support.values import NOTHING, File, Name, Positive, Problem, Section, Text, unknown
 
 # Reduced pressure at which contact without adhesion is complete, for a side of 10^6 shortest wavelengths. Surfaces with
 # fewer wavelengths are in full contact at smaller pressures.

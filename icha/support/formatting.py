@@ -10,9 +10,10 @@ import re
 from collections.abc import Iterable, Mapping
 from html import escape
 
+from icha.support.units import PREFIXES
+
 # Largest number of texts that a list names.
 _MOST_NAMES = 4
-_PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 _CONTROLS = r"\x00-\x08\x0b-\x1f\x7f-\x9f"
 # Invisible marks, characters that change the writing direction, line separators, surrogates and tags. The joiners
 # U+200C and U+200D are allowed, because Persian, Indian languages and emoji need these characters.
@@ -54,8 +55,8 @@ def choose_unit(value: float, unit: str) -> tuple[float, str]:
     Units in the notation of CF, such as `J m^-2`, are written with a slash.
     """
     exponent = 0 if value == 0 else math.floor(math.log10(abs(value)) / 3 + 1e-9) * 3
-    exponent = min(max(exponent, min(_PREFIXES)), max(_PREFIXES))
-    return 10.0**-exponent, _PREFIXES[exponent] + unit.replace(" m^-1", "/m").replace(" m^-2", "/m²")
+    exponent = min(max(exponent, min(PREFIXES)), max(PREFIXES))
+    return 10.0**-exponent, PREFIXES[exponent] + unit.replace(" m^-1", "/m").replace(" m^-2", "/m²")
 
 
 def format_quantity(value: float, unit: str) -> str:

@@ -4,7 +4,7 @@ import math
 import re
 import unicodedata
 
-from icha.support.values import conversion_factor
+from icha.support.units import conversion_factor
 
 _BRACKETS = re.compile(r"\(((?:[^()]|\([^()]*\))*)\)|\[([^\[\]]*)\]")
 _ANGLE = re.compile(r"rad(?:ians?)?\b|(?:cycles?|lines?)\b")

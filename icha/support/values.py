@@ -1,13 +1,11 @@
 """Types of values in a configuration. A value with a unit, such as `25 MPa`, becomes a float in SI units."""
 
-import contextlib
 import math
 import operator
 import re
 import unicodedata
 from collections.abc import Callable, Iterable, Iterator
 from decimal import Decimal
-from functools import cache, lru_cache
 from itertools import pairwise
 from typing import Annotated, Any, get_args
 
@@ -24,53 +22,14 @@ from icha.support.rules import (
     FloatRange,
     IntegerRange,
 )
+from icha.support.units import PHYSICAL_NAMES, conversion_factor
 
 # A number as text. PyYAML reads `1.0e6` and `1e-3` as text, so text must be accepted as a number.
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _QUANTITY = re.compile(rf"\s*({_NUMBER})\s*(.*?)\s*", re.DOTALL)
-_UNIT = re.compile(r"[A-Za-zµμÅ°%²³⁻·][\w\s*/^().µμÅ°%²³⁻·-]*")
 
-# Largest number of characters of a number or unit, because patterns and pint are slow for long texts.
+# Largest number of characters of a number with its unit, because patterns are slow for long texts.
 _LONGEST = 100
-
-# Names of quantities, by SI unit.
-PHYSICAL_NAMES = {
-    "m": "length",
-    "Pa": "pressure",
-    "J/m^2": "energy per area",
-    "N": "force",
-    "rad": "angle",
-    "s": "time",
-    "1": "ratio",
-}
-
-# The commonest units of pressure, energy per area and force. These units do not need pint, which takes long to load.
-# tests/support/test_units.py compares the factors with the factors of pint.
-USUAL = {
-    ("Pa", "Pa"): "1",
-    ("kPa", "Pa"): "1e3",
-    ("MPa", "Pa"): "1e6",
-    ("GPa", "Pa"): "1e9",
-    ("J/m^2", "J/m^2"): "1",
-    ("mJ/m^2", "J/m^2"): "1e-3",
-    ("N", "N"): "1",
-    ("mN", "N"): "1e-3",
-    ("uN", "N"): "1e-6",
-    ("nN", "N"): "1e-9",
-}
-
-# Units of length. Pint is not used, because pint also accepts px, pt, au and hand, which have other meanings in files
-# of heights.
-_PREFIXES = {"deci": "1e-1", "centi": "1e-2", "milli": "1e-3", "micro": "1e-6", "nano": "1e-9", "pico": "1e-12"}
-_SYMBOLS = {"km": "1e3", "m": "1", "dm": "1e-1", "cm": "1e-2", "mm": "1e-3", "um": "1e-6", "\u03bcm": "1e-6"}
-_SYMBOLS |= {"nm": "1e-9", "pm": "1e-12", "\u00c5": "1e-10", "in": "0.0254", "mil": "2.54e-5", "thou": "2.54e-5"}
-_LONG_NAMES = {"micron": "1e-6", "angstrom": "1e-10", "\u00e5ngstr\u00f6m": "1e-10", "inch": "0.0254", "mil": "2.54e-5"}
-_LONG_NAMES |= {
-    f"{prefix}{metre}": factor
-    for prefix, factor in {"": "1", "kilo": "1e3", **_PREFIXES}.items()
-    for metre in ("meter", "metre")
-}
-_LONG_NAMES |= {f"{name}s": factor for name, factor in _LONG_NAMES.items()} | {"inches": "0.0254"}
 
 PATTERN = rf"^\s*{_NUMBER}\s*[A-Za-zµμÅ%].*$"
 # Names become names of folders and files. Commands would read a name that begins with a hyphen as an option.
@@ -91,47 +50,6 @@ Label = Annotated[str, Field(strict=True, pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.+-]
 _RANGE = re.compile(r"\s*(\d{1,10})\s*\.\.\s*(\d{1,10})\s*")
 # Largest number of seeds.
 _MOST_SEEDS = 10**5
-
-
-@cache
-def _registry():
-    # Decimals make `100 um` exactly 1e-4 m.
-    import pint
-
-    return pint.UnitRegistry(non_int_type=Decimal)
-
-
-@lru_cache(maxsize=1024)
-def conversion_factor(unit: str, si_unit: str) -> Decimal:
-    """Return the exact factor from `unit` to `si_unit`; raise ValueError if the units are not convertible."""
-    if len(unit) > _LONGEST:
-        raise ValueError(f"a text of {len(unit)} characters is not a unit")
-    if unit == si_unit == "1":
-        return Decimal(1)
-    if (unit, si_unit) in USUAL:
-        return Decimal(USUAL[unit, si_unit])
-    return _length(unit) if si_unit == "m" else _by_pint(unit, si_unit)
-
-
-def _length(unit):
-    """Return the exact factor from a unit of length to metres; both Unicode signs for micro and angstrom are valid."""
-    name = unicodedata.normalize("NFKC", unit.strip())
-    factor = _SYMBOLS.get(name) or _LONG_NAMES.get(name.lower())
-    if factor is None:
-        raise ValueError(f"{unit!r} is not a unit of length")
-    return Decimal(factor)
-
-
-def _by_pint(unit, si_unit):
-    """Return the exact factor from `unit` to `si_unit` with pint; raise ValueError if pint cannot convert `unit`."""
-    factor = math.nan
-    if _UNIT.fullmatch(unit):
-        with contextlib.suppress(Exception):
-            quantity = _registry().Quantity(Decimal(1), _registry().parse_units(unit))
-            factor = quantity.to("" if si_unit == "1" else si_unit).magnitude
-    if not 0 < float(factor) < math.inf:
-        raise ValueError(f"{unit!r} is not a unit of {PHYSICAL_NAMES[si_unit]}")
-    return factor
 
 
 def to_si(value, si_unit: str) -> float:

@@ -6,7 +6,8 @@ import pint
 import pytest
 import yaml
 
-from icha.support.values import USUAL, to_number, to_si
+from icha.support.units import conversion_factor
+from icha.support.values import to_number, to_si
 
 
 def test_quantities_are_exact_si_values():
@@ -26,10 +27,23 @@ def test_numbers_that_yaml_reads_as_text_are_numbers():
     assert to_number(3) == 3.0
 
 
-def test_factors_that_are_known_without_pint_are_those_of_pint():
-    registry = pint.UnitRegistry(non_int_type=Decimal)
-    for (unit, si_unit), factor in USUAL.items():
-        assert registry.Quantity(Decimal(1), unit).to(si_unit).magnitude == Decimal(factor)
+OF_PINT = {
+    "Pa": ("MPa", "TPa", "N/mm**2", "kgf/cm^2", "kg*m^-1*s^-2", "psi", "mbar", "atm", "kilopascal"),
+    "J/m^2": ("mJ/m^2", "erg/cm^2", "mN/m", "dyn/cm", "J m^-2"),
+    "N": ("uN", "lbf", "mdyn", "newtons"),
+    "s": ("min", "h", "days", "ms"),
+    "rad": ("deg", "mrad"),
+}
+
+
+@pytest.mark.parametrize(("si_unit", "unit"), [(each, unit) for each, units in OF_PINT.items() for unit in units])
+def test_units_have_the_factors_of_pint(si_unit, unit):
+    expected = pint.UnitRegistry(non_int_type=Decimal).Quantity(Decimal(1), unit).to(si_unit).magnitude
+    assert float(conversion_factor(unit, si_unit)) == pytest.approx(float(expected), rel=1e-14)
+
+
+def test_signs_of_products_and_powers():
+    assert {conversion_factor(unit, "J/m^2") for unit in ("mJ/m²", "mJ·m⁻²", "mN/m", "mJ m^-2")} == {Decimal("1e-3")}
 
 
 LENGTHS = {
@@ -48,7 +62,10 @@ def test_lengths_of_scans(units, metres):
         assert to_si(f"3 {unit}", "m") == float(3 * Decimal(metres))
 
 
-@pytest.mark.parametrize(("text", "si_unit"), [("2 Mpa", "Pa"), ("50 J/m2", "J/m^2"), ("3 UM", "m"), ("3 Nm", "m")])
+SLIPS = {"2 Mpa": "Pa", "50 J/m2": "J/m^2", "3 UM": "m", "3 Nm": "m", "3 px": "m", "3 Mm": "m", "3 m^2": "m"}
+
+
+@pytest.mark.parametrize(("text", "si_unit"), SLIPS.items())
 def test_slips_of_case_and_powers_are_refused(text, si_unit):
     with pytest.raises(ValueError, match="is not a"):
         to_si(text, si_unit)
