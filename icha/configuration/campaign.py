@@ -19,7 +19,7 @@ from icha.configuration.publication import Line, Prose, Publication
 from icha.configuration.studies import RmsHeight, Study, is_unread, slope_of_height
 from icha.configuration.surfaces import AnySurface, MaterialSection
 from icha.contact.models import MODELS
-from icha.datasets.labels import is_derived_study
+from icha.datasets.labels import LABELS, RunLabels, is_derived_study
 from icha.path.targets import AREAS, CONTACT_RADIUS, FORCE, INDENTATION, WITHOUT_ADHESION, Target
 from icha.support import formatting
 from icha.support.tables import read_columns
@@ -29,18 +29,6 @@ from icha.surfaces.resolution import Resolution
 # Largest number of entries in a section. The number is small, because the check of an entry goes through all runs of
 # its study.
 _FEW = Field(max_length=100)
-
-
-class Contact(NamedTuple):
-    """Surface, seed, rms slope and material of a run.
-
-    The slope may be `measured` or an `RmsHeight` until the file of the surface is read.
-    """
-
-    surface: str
-    seed: int
-    rms_slope: float
-    material: str
 
 
 class Topography(NamedTuple):
@@ -117,8 +105,8 @@ class Campaign(Section):
     publication: Publication = Publication()
     """Metadata of a deposit. Metadata do not change any result."""
 
-    # Model and contact of each run of a study, model by model.
-    _runs: dict[str, tuple[tuple[str, Contact], ...]] = PrivateAttr(default={})
+    # Runs of each study, model by model. A slope may be `measured` or an `RmsHeight` until the files are read.
+    _runs: dict[str, tuple[RunLabels, ...]] = PrivateAttr(default={})
     _topographies: dict[str, Topography] = PrivateAttr(default={})
     _origins: dict[tuple[str, str], str] = PrivateAttr(default={})
 
@@ -134,23 +122,25 @@ class Campaign(Section):
         section = self.studies[study]
         return set(section.models) == set(MODELS) and bool(section.targets.reduced_pressures)
 
-    def contacts(self, study: str) -> list[Contact]:
-        """Return surface, seed, slope and material of each run of a study; runs of several models count once."""
-        return list(dict.fromkeys(contact for _, contact in self._runs[study]))
-
-    def runs(self, study: str) -> list[tuple[str, Contact]]:
-        """Return model and contact of each run of a study, model by model."""
+    def runs(self, study: str) -> list[RunLabels]:
+        """Return the runs of a study, model by model."""
         return list(self._runs[study])
 
-    def with_runs(self, runs: Mapping[str, Iterable[tuple[str, Contact]]]) -> Campaign:
-        """Return the campaign with the given runs (model, contact); their values replace the lists of each study."""
+    def contacts(self, study: str) -> list[RunLabels]:
+        """Return one run of a study for each surface, seed, slope and material; further models do not count."""
+        found: dict[RunLabels, RunLabels] = {}
+        for run in self._runs[study]:
+            found.setdefault(run._replace(model=""), run)
+        return list(found.values())
+
+    def with_runs(self, runs: Mapping[str, Iterable[RunLabels]]) -> Campaign:
+        """Return the campaign with the given runs; their values replace the lists of each study."""
         runs = {study: tuple(dict.fromkeys(each)) for study, each in runs.items()}
         studies = {}
         for label, study in self.studies.items():
-            models, contacts = zip(*runs[label], strict=True)
-            lists = [list(dict.fromkeys(column)) for column in (*zip(*contacts, strict=True), models)]
-            keys = ("surfaces", "seeds", "rms_slopes", "materials", "models")
-            studies[label] = study.model_copy(update=dict(zip(keys, lists, strict=True)))
+            columns = dict(zip(RunLabels._fields, zip(*runs[label], strict=True), strict=True))
+            lists = {f"{name}s": list(dict.fromkeys(columns[name])) for name in LABELS}
+            studies[label] = study.model_copy(update=lists)
         campaign = self.model_copy(update={"studies": studies})
         campaign._runs = runs
         return campaign
@@ -159,10 +149,9 @@ class Campaign(Section):
         """Return the campaign with properties of topographies from files; numbers replace the slope `measured`."""
 
         def with_slope(run):
-            model, contact = run
-            if not is_unread(contact.rms_slope):
+            if not is_unread(run.rms_slope):
                 return run
-            return model, contact._replace(rms_slope=topographies[contact.surface].slope_of(contact.rms_slope))
+            return run._replace(rms_slope=topographies[run.surface].slope_of(run.rms_slope))
 
         campaign = self.with_runs({study: map(with_slope, runs) for study, runs in self._runs.items()})
         campaign._topographies = dict(topographies)

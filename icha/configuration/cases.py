@@ -13,7 +13,7 @@ from icha.datasets.labels import RunLabels
 
 def run_cases(campaign: Campaign) -> list[RunLabels]:
     """Return the labels of all runs of a campaign, study by study and model by model, in the order of the file."""
-    return [RunLabels(label, model, *contact) for label in campaign.studies for model, contact in campaign.runs(label)]
+    return [run for label in campaign.studies for run in campaign.runs(label)]
 
 
 def surface_cases(campaign: Campaign) -> list[tuple[str, int]]:

@@ -15,13 +15,13 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from icha.configuration.campaign import Campaign, Contact
+from icha.configuration.campaign import Campaign
 from icha.configuration.errors import MOST_PROBLEMS, problem_of
 from icha.configuration.samples import RULES
 from icha.configuration.studies import MEASURED, SCALARS, RmsHeight, Study, slope_of_height
 from icha.configuration.surfaces import SURFACE_KINDS, MaterialSection
 from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
-from icha.datasets.labels import coarse_study, inputs_study, is_derived_study, number_label
+from icha.datasets.labels import RunLabels, coarse_study, inputs_study, is_derived_study, number_label
 from icha.path.targets import ESTIMATED_AT_TARGETS, ESTIMATED_OF_LOOPS
 from icha.support.units import PREFIXES
 from icha.support.values import LONGEST_LABEL, NOTHING, Problem, list_names, rule_of
@@ -68,17 +68,18 @@ def expand_design(campaign: Campaign, content: Mapping) -> tuple[Campaign, list[
         levels = study.seeds_of_levels
         if study.sample is not None and levels is not None:
             sampled = _study_of_inputs(study)
-            contacts = [variants.contact(point) for point in _points(label, sampled)]
-            runs[inputs_study(label)] = list(itertools.product(sampled.models, contacts))
-            studies[inputs_study(label)] = sampled
+            name = inputs_study(label)
+            runs[name] = [variants.run(name, sampled.models[0], point) for point in _points(label, sampled)]
+            studies[name] = sampled
             study = study.model_copy(update={"sample": None})
-        contacts = [variants.contact(point) for point in _points(label, study)]
-        runs[label], studies[label] = list(itertools.product(study.models, contacts)), study
+        of_model = [variants.run(label, study.models[0], point) for point in _points(label, study)]
+        runs[label] = [run._replace(model=model) for model in study.models for run in of_model]
+        studies[label] = study
         if study.error_check and levels is None:
-            first = {contact._replace(seed=0): contact for contact in reversed(contacts)}
-            runs[label] += [(REFERENCE_MODEL, contact) for contact in contacts if contact in first.values()]
+            first = {run._replace(seed=0): run for run in reversed(of_model)}
+            runs[label] += [run._replace(model=REFERENCE_MODEL) for run in of_model if run in first.values()]
         if levels is not None:
-            runs |= _runs_of_levels(label, levels, contacts, variants)
+            runs |= _runs_of_levels(label, levels, of_model, variants)
             if levels.coarse:
                 studies[coarse_study(label)] = study.model_copy(update={"levels": None, "accuracy": None})
     if variants.problems:
@@ -96,13 +97,14 @@ def _study_of_inputs(study: Study) -> Study:
     return study.model_copy(update={"levels": None, "accuracy": None, "seeds": [min(levels.seeds)], "models": models})
 
 
-def _runs_of_levels(label, levels, contacts, variants):
-    """Return the runs of the studies that compute the levels of a study, by name."""
+def _runs_of_levels(label, levels, of_model, variants):
+    """Return the runs of the studies that compute the levels of a study, by name; `of_model` has runs of one model."""
     level_of_model = {DEFAULT_MODEL: set(levels.asperities or ()), REFERENCE_MODEL: set(levels.fine)}
-    runs = {label: [(m, c) for m, seeds in level_of_model.items() for c in contacts if c.seed in seeds]}
+    seeds_of_model = level_of_model.items()
+    runs = {label: [run._replace(model=m) for m, seeds in seeds_of_model for run in of_model if run.seed in seeds]}
     if levels.coarse:
-        coarse = [variants.on_half_grid(contact, label) for contact in contacts if contact.seed in set(levels.coarse)]
-        runs[coarse_study(label)] = [(REFERENCE_MODEL, contact) for contact in coarse]
+        of_level = (run._replace(model=REFERENCE_MODEL) for run in of_model if run.seed in set(levels.coarse))
+        runs[coarse_study(label)] = [variants.on_half_grid(run) for run in of_level]
     return runs
 
 
@@ -279,8 +281,8 @@ class _Variants:
         # Problems by location, so that each wrong value is reported once.
         self.problems: dict[tuple, Problem] = {}
 
-    def contact(self, point: Mapping[str, _Located]) -> Contact:
-        """Return the labels of a contact; create the variants of surface and material that the contact needs."""
+    def run(self, study: str, model: str, point: Mapping[str, _Located]) -> RunLabels:
+        """Return the labels of a run; create the variants of surface and material that the run needs."""
         surface, material = point["surface"][1], point["material"][1]
         fields = type(self._campaign.surfaces[surface]).model_fields
         varied = {name: point[name] for name in point if name in SCALARS}
@@ -300,21 +302,18 @@ class _Variants:
         elif not section.from_file and isinstance(slope, RmsHeight):
             random = self.derived["surfaces"].get(variant, section)
             slope = slope_of_height(slope, random.rms_height_at_unit_slope)
-        return Contact(
-            variant,
-            point["seed"][1] if section.random else 0,
-            slope,
-            self._variant("materials", material, of_material, case),
-        )
+        seed = point["seed"][1] if section.random else 0
+        return RunLabels(study, model, variant, seed, slope, self._variant("materials", material, of_material, case))
 
-    def on_half_grid(self, contact: Contact, study: str) -> Contact:
-        """Return a contact on the same surface with half the number of nodes along each side."""
+    def on_half_grid(self, run: RunLabels) -> RunLabels:
+        """Return the run of the coarse study on the same surface with half the number of nodes along each side."""
         every = self._campaign.surfaces | self.derived["surfaces"]
-        base, grid = contact.surface, every[contact.surface].grid
-        half = (("studies", study, _key_of_levels(self._campaign.studies[study])), grid // 2)
+        base, grid = run.surface, every[run.surface].grid
+        half = (("studies", run.study, _key_of_levels(self._campaign.studies[run.study])), grid // 2)
         origin = self.origin.get(("surfaces", base), base)
         changes = {name: value for name, value in self._changes.get(base, {}).items() if name != "grid"}
-        return contact._replace(surface=self._variant("surfaces", origin, changes | {"grid": half}))
+        surface = self._variant("surfaces", origin, changes | {"grid": half})
+        return run._replace(study=coarse_study(run.study), surface=surface)
 
     def _variant(self, section: str, base: str, changes: Mapping[str, _Located], case: str | None = None) -> str:
         """Return the name of a variant: a surface or material with changed values. Create the variant if it is new."""

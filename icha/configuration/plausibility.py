@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 from icha.asperity.full_contact import FULL_CONTACT_BELOW, full_contact_energy_ratio
 from icha.asperity.material import Material
 from icha.asperity.tabor import LEAST_TABOR, describe_short_range
-from icha.configuration.campaign import Campaign, Contact
+from icha.configuration.campaign import Campaign
 from icha.configuration.surfaces import SelfAffineSurface
 from icha.contact.attraction import FINITE_RANGE, attraction_on, resolving_spacing
 from icha.contact.models import DEFAULT_MODEL, MODELS
-from icha.datasets.labels import coarse_study, is_derived_study
+from icha.datasets.labels import RunLabels, coarse_study, is_derived_study
 from icha.path.targets import FORCE, NOMINAL_PRESSURE, QUANTITIES, UNITS
 from icha.support import formatting
 from icha.support.usual import RMS_SLOPE, SIDE, USUAL, Usual
@@ -208,13 +208,12 @@ def coarse_contacts(campaign: Campaign) -> Iterator[Unusual]:
                 break
 
 
-def smooth_contacts(campaign: Campaign, study: str) -> list[Contact]:
-    """Return the contacts of smooth shapes that a study computes with boundary elements."""
-    contacts = [contact for model, contact in campaign.runs(study) if MODELS[model].by_cells]
-    return [contact for contact in contacts if campaign.surfaces[contact.surface].smooth]
+def smooth_contacts(campaign: Campaign, study: str) -> list[RunLabels]:
+    """Return the runs of smooth shapes that a study computes with boundary elements."""
+    return [run for run in campaign.runs(study) if MODELS[run.model].by_cells and campaign.surfaces[run.surface].smooth]
 
 
-def resolution_of_smooth(campaign: Campaign, study: str, contact: Contact) -> Resolution:
+def resolution_of_smooth(campaign: Campaign, study: str, contact: RunLabels) -> Resolution:
     """Return the number of cells in the smallest contact radius of a smooth shape at the targets of a study."""
     from icha.references.limits import contact_resolution  # imports SciPy, which takes time
 
@@ -228,7 +227,7 @@ def long_ranges(campaign: Campaign) -> Iterator[Unusual]:
     """For each material, yield the range of attraction if boundary elements badly assume a short range."""
     found: dict[str, tuple[float, Unusual]] = {}
     for name in campaign.studies:
-        of_cells = [contact for model, contact in campaign.runs(name) if MODELS[model].by_cells]
+        of_cells = [run for run in campaign.runs(name) if MODELS[run.model].by_cells]
         for contact in {contact._replace(seed=0): contact for contact in of_cells}.values():
             value = tabor_parameter(campaign, contact)
             origin = campaign.origin("materials", contact.material)
@@ -247,7 +246,7 @@ def long_ranges(campaign: Campaign) -> Iterator[Unusual]:
     yield from (unusual for _, unusual in found.values())
 
 
-def tabor_parameter(campaign: Campaign, contact: Contact) -> float | None:
+def tabor_parameter(campaign: Campaign, contact: RunLabels) -> float | None:
     """Return the Tabor parameter of a contact, as in the file of its run; None without adhesion or without a radius.
 
     The radius is 1/(rms curvature) of the roughness; without roughness, it is the radius of the shape.
@@ -258,7 +257,7 @@ def tabor_parameter(campaign: Campaign, contact: Contact) -> float | None:
     return float(material.tabor_parameter(radius)) if material.surface_energy and radius else None
 
 
-def rms_curvature(campaign: Campaign, contact: Contact) -> float:
+def rms_curvature(campaign: Campaign, contact: RunLabels) -> float:
     """Return the rms curvature of profiles of a rough surface at the rms slope of a contact, 1/m."""
     section = campaign.surfaces[contact.surface]
     if isinstance(section, SelfAffineSurface):

@@ -7,7 +7,6 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, WithJsonSchema, model_validator
 
-from icha.datasets.labels import RunLabels
 from icha.support.values import Problem, Section, Text, distinct
 
 # Relations of a deposit to other works: the types of DataCite 4.5 that Zenodo also supports.
@@ -233,12 +232,7 @@ class Publication(Section):
         """Yield a problem for each entry of `known_failures` whose run is not in the campaign."""
         if not self.known_failures:
             return
-        runs = {
-            RunLabels(label, model, *contact).path
-            for label, study in campaign.studies.items()
-            for model in study.models
-            for contact in campaign.contacts(label)
-        }
+        runs = {run.path for label in campaign.studies for run in campaign.runs(label)}
         for index, failure in enumerate(self.known_failures):
             if failure.run not in runs:
                 reason = f"is not a run; expected a run of the campaign, such as {min(runs)}"

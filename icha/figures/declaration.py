@@ -212,7 +212,7 @@ class RunFigure(TopographyFigure):
         """Return the first run that fits the options; a run with adhesion is preferred."""
         model = first_model(campaign.studies[self.study].models)
         wanted = self.model_dump(include=set(RunLabels._fields), exclude_none=True)
-        runs = [RunLabels(self.study, model, *contact) for contact in campaign.contacts(self.study)]
+        runs = [contact._replace(model=model) for contact in campaign.contacts(self.study)]
         runs = [run for run in runs if wanted.items() <= run._asdict().items()]
         return next((run for run in runs if campaign.materials[run.material].surface_energy > 0), runs[0])
 

@@ -8,9 +8,9 @@ import small_campaign as small
 
 from icha.asperity.material import Material
 from icha.asperity.stickiness import stickiness
-from icha.configuration.campaign import Contact
 from icha.configuration.load import load_configuration
 from icha.configuration.plausibility import rms_curvature
+from icha.datasets.labels import RunLabels
 from icha.planning.validity import expected_validity
 from icha.surfaces.measured.topography import prepared_topography
 from icha.surfaces.moments import spectral_moments
@@ -51,7 +51,7 @@ def campaign(tmp_path):
 
 def test_curvatures_are_those_of_the_surfaces(campaign):
     surface = small.surface()
-    rough, scanned = (Contact(name, 0, 1.0, "bare") for name in ("rough", "scan"))
+    rough, scanned = (RunLabels("outside", "asperities", name, 0, 1.0, "bare") for name in ("rough", "scan"))
     assert rms_curvature(campaign, rough) == pytest.approx(surface.rms_curvature / surface.rms_slope, rel=0.1)
     section = campaign.surfaces["scan"]
     scan = prepared_topography(section.path, section.preparation).surface
