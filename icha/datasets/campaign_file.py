@@ -196,7 +196,7 @@ class _Study:
             if names := [name for name, variable in self.variables.items() if variable.dims == (dim,)]:
                 variables |= self._ragged(dim, names)
         variables |= self._of_design()
-        coordinates = {name: variables.pop(name) for name in self.coordinates if name in variables}
+        coordinates = {name: variables.pop(name) for name in sorted(self.coordinates) if name in variables}
         coordinates |= {
             name: _along_label(name, *each, self.axes) for name, each in varied.items() if name not in variables
         }
