@@ -41,11 +41,11 @@ from icha.support.input_files import text
 LabelledRun = tuple[RunLabels | tuple, xr.Dataset | str | os.PathLike]
 
 # Variables of runs that are in the campaign dataset: all except maps.
-_OF_RUNS = [
+_OF_RUNS = frozenset(
     name
     for name, described in (RUN | OF_MODELS | CYCLE | LOOP | INDENTER).items()
     if not set(CELLS) & set(described.dims)
-]
+)
 # Values that must be the same for several runs count as equal up to this relative difference.
 _SAME = 1e-9
 _ENDED_EARLY = (INCOMPLETE, BEYOND_MODEL)
@@ -111,8 +111,8 @@ def _read_values(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[s
     with readable(path), h5py.File(path) as file:
         check_is_run(file, path)
         values = {}
-        for name in _OF_RUNS:
-            if name in file:
+        for name in file:
+            if name in _OF_RUNS:
                 variable = h5d.open(file.id, name.encode())
                 found = np.empty(variable.shape, variable.dtype.newbyteorder("="))
                 variable.read(h5s.ALL, h5s.ALL, found)
