@@ -8,7 +8,8 @@ import cyclic_campaign as cyclic
 import small_campaign as small
 import xarray as xr
 
-from icha.datasets.campaign_file import write_campaign
+from icha.datasets.campaign_file import campaign_tree
+from icha.datasets.files import write_dataset
 from icha.datasets.labels import RunLabels
 from icha.datasets.surface_file import write_surface
 
@@ -34,7 +35,7 @@ def write_results(folder: Path) -> Path:
     """Write the campaign dataset, the topographies, and the runs by boundary elements."""
     attributes = {"title": "Small </script> campaign", "campaign": "small", "summary": "For tests."}
     (folder / "dataset").mkdir(parents=True)
-    write_campaign(runs().items(), folder / "dataset/small.nc", attrs=attributes)
+    write_dataset(campaign_tree(runs().items(), attrs=attributes), folder / "dataset/small.nc")
     for seed in (1, 2, 3):
         file = folder / f"surfaces/rough/seed{seed}.nc"
         write_surface(file, small.surface(seed), name="rough", seed=seed, spectrum=small.SPECTRUM)

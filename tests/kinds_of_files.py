@@ -8,7 +8,7 @@ import small_campaign as small
 
 import icha
 from icha.analysis.common_loads import compare_campaign
-from icha.datasets.campaign_file import write_campaign
+from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import read_campaign, write_dataset
 from icha.datasets.labels import RunLabels
 from icha.datasets.surface_file import write_surface
@@ -53,7 +53,7 @@ def write_campaign_of(path: Path, looped) -> None:
     (failed, run), *others = small.runs()
     pairs = [(failed, incomplete(run)), *others[:-1], (LOOP, looped)]
     design = [*(labels for labels, _ in small.runs()), LOOP]
-    write_campaign(pairs, path, design=design, attrs=ATTRIBUTES | PUBLISHED)
+    write_dataset(campaign_tree(pairs, design=design, attrs=ATTRIBUTES | PUBLISHED), path)
 
 
 def write_all(folder: Path) -> list[Path]:

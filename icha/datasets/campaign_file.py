@@ -1,4 +1,4 @@
-"""Build the campaign dataset from the runs of all studies, and write it to a file.
+"""Build the campaign dataset from the runs of all studies.
 
 Each study is one group with arrays along the labels of its runs. ICHA reads all runs into memory, arranges them along
 the labels, and fills the arrays of a study one after the other. `docs/howto/dataset.md` describes the dataset.
@@ -17,7 +17,7 @@ import xarray as xr
 
 from icha.datasets.attributes import COLLECTED, combine_attributes
 from icha.datasets.build import describe_variables
-from icha.datasets.files import check_is_run, encode_texts, is_text, read_run, readable, write_dataset
+from icha.datasets.files import check_is_run, encode_texts, is_text, read_run, readable
 from icha.datasets.labels import LABELS, RunLabels, arrange_slopes, slope_dims
 from icha.datasets.variables.campaign import (
     BEYOND_MODEL,
@@ -403,11 +403,3 @@ def campaign_tree(
     described = combine_attributes("Campaign of rough contacts", _STUDIES, COLLECTED, origins)
     access = _ACCESS.format(", ".join(designs), next(iter(designs)))
     return xr.DataTree.from_dict({"/": xr.Dataset(attrs=described | {"comment": access} | dict(attrs))} | groups)
-
-
-def write_campaign(runs: Iterable[LabelledRun], path: str | os.PathLike, **options: Any) -> None:
-    """Build a campaign dataset with the `options` of `campaign_tree`, and write it to the netCDF-4 file `path`.
-
-    The same runs give the same bytes. Raises the errors of `campaign_tree` and `write_dataset`.
-    """
-    write_dataset(campaign_tree(runs, **options), path)

@@ -27,7 +27,7 @@ from icha.cli.progress import Progress
 from icha.cli.project import list_campaigns, reports_errors
 from icha.configuration.cases import campaign_sha256, run_cases
 from icha.configuration.load import load_configuration
-from icha.datasets.campaign_file import write_campaign
+from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import read_dataset, write_dataset
 from icha.datasets.surface_file import write_surface
 from icha.planning.costs import Cost
@@ -418,7 +418,7 @@ def test_a_dataset_with_runs_that_are_no_longer_in_the_campaign_is_computed_agai
     files = campaign_files(campaign)
     write_results(campaign, results, [*files.surfaces, *files.runs])
     for sha256, state in ((campaign_sha256(campaign), DONE), ("0" * 64, TO_DO)):
-        write_campaign(small.runs(), results / files.dataset, attrs={"config_sha256": sha256})
+        write_dataset(campaign_tree(small.runs(), attrs={"config_sha256": sha256}), results / files.dataset)
         assert states(campaign, results)[files.dataset] == state
     assert states(campaign, results)[files.checks] == TO_DO
 
@@ -462,7 +462,7 @@ def test_validity_of_the_models_is_printed_before_a_run(tiny, small_machine):
 
 def test_checks_and_validity_are_printed_separately_after_a_run(tiny, capsys):
     campaign, results = tiny
-    write_campaign(small.runs(), results / "dataset/tiny.nc")
+    write_dataset(campaign_tree(small.runs()), results / "dataset/tiny.nc")
     write_checks(check_campaign(small.tree()), results / "checks.json")
     sys.modules["icha.cli.run"]._print_checks(campaign, results)
     checks, _, *statements = capsys.readouterr().out.splitlines()

@@ -6,7 +6,8 @@ import sys
 import pytest
 import small_campaign as small
 
-from icha.datasets.campaign_file import write_campaign
+from icha.datasets.campaign_file import campaign_tree
+from icha.datasets.files import write_dataset
 from icha.figures.own_figure import OwnFigure, modules_of
 from icha.figures.registry import draw_figure
 
@@ -27,7 +28,7 @@ def draw(study):
 @pytest.fixture
 def draw(tmp_path):
     """A function that draws the study `single` of the small campaign with a script."""
-    write_campaign(small.runs(), tmp_path / "small.nc", attrs={"title": "Small", "summary": "Small."})
+    write_dataset(campaign_tree(small.runs(), attrs={"title": "Small", "summary": "Small."}), tmp_path / "small.nc")
     files = [tmp_path / f"mine.{ending}" for ending in ("png", "pdf", "txt")]
 
     def drawn(text):

@@ -10,7 +10,7 @@ import xarray as xr
 from icha import Surface
 from icha.datasets import files
 from icha.datasets.campaign import run_labels, select_run
-from icha.datasets.campaign_file import campaign_tree, write_campaign
+from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import read_campaign, read_dataset, read_run, write_dataset
 from icha.datasets.labels import LABELS
 from icha.datasets.surface_file import read_surface, write_surface
@@ -174,24 +174,23 @@ def test_runs_may_come_as_files_in_any_order(tmp_path):
         pairs.append((labels, tmp_path / f"{k}.nc"))
     design = [labels for labels, _ in pairs]
     for name, given in (("one.nc", pairs), ("two.nc", reversed(pairs)), ("three.nc", iter(runs))):
-        write_campaign(given, tmp_path / name, design=design)
+        write_dataset(campaign_tree(given, design=design), tmp_path / name)
         xr.testing.assert_identical(read_campaign(tmp_path / name), campaign_tree(runs))
     assert select_run(read_campaign(tmp_path / "one.nc"), failed).attrs["incomplete"] == "lost at 3 µm"
     assert len({(tmp_path / name).read_bytes() for name in ("one.nc", "two.nc", "three.nc")}) == 1
 
 
-def test_a_campaign_that_cannot_be_written_leaves_nothing(tmp_path):
+def test_runs_that_cannot_be_in_a_campaign_are_refused_by_their_files(tmp_path):
     labels, run = small.runs()[0]
     (tmp_path / "damaged.nc").write_bytes(b"nonsense")
     with pytest.raises(ValueError, match=r"damaged\.nc: not a readable"):
-        write_campaign([(labels, run), (labels._replace(seed=2), tmp_path / "damaged.nc")], tmp_path / "a" / "c.nc")
+        campaign_tree([(labels, run), (labels._replace(seed=2), tmp_path / "damaged.nc")])
     write_dataset(simple(), tmp_path / "other.nc")
     with pytest.raises(ValueError, match=r"other\.nc: not a run dataset"):
-        write_campaign([(labels, tmp_path / "other.nc")], tmp_path / "a" / "c.nc")
+        campaign_tree([(labels, tmp_path / "other.nc")])
     odd = run.assign(contact_modulus=run["contact_modulus"] * 2, seed=run["seed"] + 1)
     with pytest.raises(ValueError, match="contact_modulus differs"):
-        write_campaign([(labels, run), (labels._replace(seed=2), odd)], tmp_path / "a" / "c.nc")
-    assert not (tmp_path / "a").exists()
+        campaign_tree([(labels, run), (labels._replace(seed=2), odd)])
 
 
 def test_a_run_that_ends_early_keeps_its_spots_where_others_meet_their_snapshots_in_another_order(tmp_path):
@@ -220,7 +219,7 @@ def same(taken, run, labels):
 def test_runs_of_different_lengths_are_taken_out_unchanged(tmp_path, monkeypatch, kept):
     tree = cyclic.tree()
     if kept != "in memory":
-        write_campaign(cyclic.runs().items(), tmp_path / "c.nc")
+        write_dataset(campaign_tree(cyclic.runs().items()), tmp_path / "c.nc")
         monkeypatch.setattr(files, "LEFT_IN_FILE", 0 if kept == "left in its file" else 2**30)
         tree = read_campaign(tmp_path / "c.nc")
         assert tree["loops"].variables["work"]._in_memory == (kept == "from its file")

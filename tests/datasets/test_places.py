@@ -13,7 +13,7 @@ from icha.analysis.common_loads import compare_campaign
 from icha.analysis.validity import statements_on_dataset
 from icha.cli import app
 from icha.datasets.campaign import run_labels, select_run
-from icha.datasets.campaign_file import write_campaign
+from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import read_campaign, write_dataset
 from icha.datasets.labels import (
     LABELS,
@@ -69,7 +69,7 @@ def test_surfaces_may_have_different_numbers_of_slopes(tmp_path):
     runs = dict(crops.many(3))
     first = next(iter(runs))
     runs[first._replace(rms_slope=0.9)] = runs[first].assign(rms_slope=runs[first]["rms_slope"] * 0 + 0.9)
-    write_campaign(runs.items(), tmp_path / "a.nc")
+    write_dataset(campaign_tree(runs.items()), tmp_path / "a.nc")
     tree = read_campaign(tmp_path / "a.nc")
     study = tree[crops.STUDY].to_dataset()
     np.testing.assert_allclose(study["rms_slope"].values, [[0.1, 0.9], [0.101, np.nan], [0.102, np.nan]])
@@ -94,7 +94,7 @@ def test_what_is_not_there_is_named():
 
 
 def test_xarray_alone_selects_a_surface_and_its_slope(tmp_path):
-    write_campaign(crops.runs().items(), tmp_path / "a.nc")
+    write_dataset(campaign_tree(crops.runs().items()), tmp_path / "a.nc")
     with xr.open_datatree(tmp_path / "a.nc") as tree:
         study = tree[crops.STUDY].to_dataset()
         run = study.sel(model="asperities", surface="crop2", seed=1, material="soft").isel(rms_slope=0)
@@ -156,7 +156,7 @@ def test_report_checks_and_validity_of_either_form_are_the_same():
 
 def test_commands_show_and_check_the_file(tmp_path):
     file, tree = tmp_path / "crops.nc", crops.tree()
-    write_campaign(crops.runs().items(), file)
+    write_dataset(campaign_tree(crops.runs().items()), file)
     shown = CliRunner().invoke(app, ["show", str(file)])
     assert shown.exit_code == 0, shown.output
     assert "12 complete" in shown.output

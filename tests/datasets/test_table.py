@@ -10,8 +10,8 @@ import small_campaign as small
 from icha.configuration.cases import run_cases
 from icha.configuration.design import unit_of, varied_values
 from icha.configuration.load import load_configuration
-from icha.datasets.campaign_file import write_campaign
-from icha.datasets.files import read_campaign
+from icha.datasets.campaign_file import campaign_tree
+from icha.datasets.files import read_campaign, write_dataset
 from icha.datasets.labels import RunLabels
 from icha.datasets.table import as_csv, tidy_table
 
@@ -25,7 +25,7 @@ def campaign(tmp_path_factory):
         (RunLabels("one", "asperities", name, seed, 1.0, "soft"), small.run(seed)) for name in NAMES for seed in (1, 2)
     ]
     varied = {"one": {"hurst": ("surface", "1", NAMES), "surface_energy": ("material", "J m^-2", {"soft": 9.0})}}
-    write_campaign(runs, path, varied=varied)
+    write_dataset(campaign_tree(runs, varied=varied), path)
     return read_campaign(path)
 
 

@@ -28,7 +28,7 @@ from icha.cli import app
 from icha.configuration.cases import campaign_sha256
 from icha.configuration.load import collect_inputs, load_configuration
 from icha.configuration.publication import KnownFailure
-from icha.datasets.campaign_file import write_campaign
+from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import write_dataset
 from icha.deposit import make
 from icha.deposit.crate import Job
@@ -270,8 +270,9 @@ def campaign(tmp_path):
         runs.append((case, run))
         (results / path).parent.mkdir(parents=True, exist_ok=True)
         write_dataset(run, results / path)
-    write_campaign(
-        runs, results / files.dataset, attrs={"campaign": "small", "config_sha256": campaign_sha256(campaign)}
+    write_dataset(
+        campaign_tree(runs, attrs={"campaign": "small", "config_sha256": campaign_sha256(campaign)}),
+        results / files.dataset,
     )
     (results / "checks.json").write_text(json.dumps([check(run, 1e-12) for run in files.runs]))
     write_checksums(results, [str(results / path) for path in (*files.runs, files.dataset)], results / CHECKSUMS)
@@ -368,7 +369,7 @@ def test_results_that_do_not_belong_together_are_refused(campaign):
     with pytest.raises(ValueError, match=f"{path}: it was computed by another version of the program"):
         refuse_mixed(results, campaign)
     (results / path).write_bytes(content)
-    write_campaign(list(small.runs()), results / files.dataset, attrs={"config_sha256": "0" * 64})
+    write_dataset(campaign_tree(list(small.runs()), attrs={"config_sha256": "0" * 64}), results / files.dataset)
     with pytest.raises(ValueError, match=r"dataset/tiny.nc was not computed with the settings of the campaign"):
         refuse_mixed(results, campaign)
 

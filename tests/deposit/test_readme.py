@@ -16,7 +16,8 @@ from publications import COMMIT, LEAST
 from icha.analysis.checks import check_campaign
 from icha.configuration.load import load_configuration
 from icha.configuration.publication import Author, Funding, KnownFailure
-from icha.datasets.campaign_file import write_campaign
+from icha.datasets.campaign_file import campaign_tree
+from icha.datasets.files import write_dataset
 from icha.deposit.readme import markdown, readme
 from icha.planning.costs import Cost
 
@@ -147,7 +148,7 @@ def test_the_example_selects_a_run_of_surfaces_with_slopes_of_their_own(tmp_path
     runs = [(labels, run) for labels, run in crops.runs().items() if labels.model == "asperities"]
     tree = small.campaign_tree(runs, attrs={"campaign": "crops"})
     page = page_of(tree, check_campaign(tree), load_configuration(REPOSITORY / "config/campaigns/smoke.yaml").campaign)
-    write_campaign(runs, tmp_path / "dataset/smoke.nc")
+    write_dataset(campaign_tree(runs), tmp_path / "dataset/smoke.nc")
     monkeypatch.chdir(tmp_path)
     example = re.search(r"^study = .*\nruns = .*\nruns = .*$", page, re.MULTILINE)[0]
     namespace = {"xr": xr}

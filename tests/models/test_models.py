@@ -15,7 +15,7 @@ from icha.analysis.model_error import model_error
 from icha.checks.run import check_run
 from icha.contact.models import DEFAULT_MODEL, MODELS, REFERENCE_MODEL
 from icha.datasets.campaign import run_labels, select_run
-from icha.datasets.campaign_file import campaign_tree, write_campaign
+from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import read_campaign, write_dataset
 from icha.datasets.format import CAMPAIGN, RUN, identify_file, problems_with_file
 from icha.datasets.labels import LABELS, RunLabels
@@ -106,7 +106,7 @@ def test_model_is_the_first_dimension_of_every_study(runs, tmp_path):
         assert study["contact_area_fraction"].dims == (*LABELS, "step") and study["model"].values.tolist() == [
             DEFAULT_MODEL
         ]
-    write_campaign(runs.items(), tmp_path / "both.nc", attrs={"campaign": "both", "license": "CC0-1.0"})
+    write_dataset(campaign_tree(runs.items(), attrs={"campaign": "both", "license": "CC0-1.0"}), tmp_path / "both.nc")
     tree = read_campaign(tmp_path / "both.nc")
     study = tree["one"].to_dataset()
     assert study["model"].values.tolist() == [DEFAULT_MODEL, REFERENCE_MODEL]

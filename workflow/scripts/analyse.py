@@ -9,8 +9,8 @@ from icha.analysis.common_loads import compare_campaign
 from icha.analysis.estimates import estimate_campaign
 from icha.analysis.model_error import model_error
 from icha.analysis.sensitivity import sensitivity_of_campaign
-from icha.datasets.campaign_file import write_campaign
-from icha.datasets.files import read_campaign, read_run, write_dataset
+from icha.datasets.campaign_file import campaign_tree
+from icha.datasets.files import read_run, write_dataset
 from icha.datasets.labels import RunLabels
 from icha.datasets.stamp import refuse_outdated
 from icha.datasets.table import as_csv, tidy_table
@@ -38,10 +38,8 @@ def analyse(runs, outputs, *, stamps, compared, varied, samples, attributes, des
         } | attributes
 
     pairs = [(labels, path) for path, labels in runs.items()]
-    write_campaign(
-        pairs, outputs["dataset"], design=runs.values(), attrs=described_as("dataset") | described, varied=dict(varied)
-    )
-    tree = read_campaign(outputs["dataset"])
+    tree = campaign_tree(pairs, design=runs.values(), attrs=described_as("dataset") | described, varied=dict(varied))
+    write_dataset(tree, outputs["dataset"])
     with whole_file(outputs["table"]) as temporary:
         temporary.write_text(as_csv(tidy_table(tree)), encoding="utf-8")
     write_dataset(compare_campaign(tree, attrs=described_as("comparison")), outputs["comparison"])
