@@ -16,7 +16,7 @@ from icha.configuration.errors import ConfigurationError
 from icha.configuration.load import INPUTS, load_configuration
 from icha.configuration.yaml_files import read_yaml
 from icha.datasets.attributes import why_no_result
-from icha.datasets.results import CONFIGURATION
+from icha.datasets.results import CONFIGURATION, RUN
 from icha.deposit.program import version_differences
 from icha.deposit.verify import CHECKSUMS, SOURCE, files_of, read_text
 from icha.support.checksums import sha256_of
@@ -31,7 +31,8 @@ _PYPROJECT, _LOCK = f"{SOURCE}/pyproject.toml", f"{SOURCE}/uv.lock"
 _COMPUTING = {"finufft", "mugrid", "numpy", "pandas", "scipy", "surfacetopography"}
 # Entries in the folder of a rerun: file with the checksum of SHA256SUMS, and folder for configuration and results.
 _BEGUN, _PROJECT = "rerun-of.sha256", "data"
-_RUN = re.compile(r"runs(/[^/]+){4}/[^/]+\.nc")
+_PARTS = dict.fromkeys(("study", "surface", "seed", "slope", "material"), "[^/]+")
+_RUN = re.compile(RUN.format(**_PARTS, model_folder="(?:[^/]+/)?"))
 
 
 class RerunError(ValueError):

@@ -158,6 +158,14 @@ def test_single_runs(deposit, reproduce, computed, tmp_path):
     assert status == 2 and "has no such run; expected smallest, or one of its 2 runs" in output and HARD in output
 
 
+def test_single_runs_of_boundary_elements(deposit, reproduce, computed, tmp_path):
+    run = "load/plate/seed0/slope0.5/boundary_elements/soft"
+    write_run(tmp_path / "cells.nc")
+    packed = deposit(**{f"runs/{run}.nc": (tmp_path / "cells.nc").read_bytes()})
+    assert reproduce(packed, "--only", run, "--folder", tmp_path / "again")[0] == 0
+    assert computed[-1][1] == [f"results/tiny/runs/{run}.nc"]
+
+
 def test_the_smallest_run_is_the_smallest_that_is_complete(deposit, reproduce, computed, tmp_path):
     write_run(tmp_path / "failed.nc", 2, incomplete="the path ends: stuck")
     failed = (tmp_path / "failed.nc").read_bytes()
