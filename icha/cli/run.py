@@ -193,7 +193,7 @@ def _compute(command: list[str], workflow: Path, campaign, results: Path, target
 
 
 def _print_reasons(results: Path, log: Path, begin: int, progress: Progress, stopped: bool) -> list[str]:
-    """Print why jobs failed: the last line `Error: …` of each log, or else the end of Snakemake's output.
+    """Print why jobs failed: the last line `Error: …` of each log, or else a part of Snakemake's output.
 
     Return the names of the logs with errors. In `log`, the output of this call begins at the byte `begin`.
     """
@@ -211,7 +211,10 @@ def _print_reasons(results: Path, log: Path, begin: int, progress: Progress, sto
     elif not stopped:
         heading = "continue" if progress.finished else "start"
         output = log.read_bytes()[begin:].decode(errors="replace").splitlines()
-        _print_lines(f"Snakemake could not {heading}:", output[-MOST_LINES:])
+        # A job that was killed has written no error; Snakemake names the signal in the lines before the rule.
+        failed = next((k for k, line in enumerate(output) if line.startswith("Error in rule")), None)
+        shown = output[-MOST_LINES:] if failed is None else output[max(failed - 3, 0) : failed + 6]
+        _print_lines(f"Snakemake could not {heading}:", shown)
     if reason := probe_folder(results):
         # The logs of the jobs are in the same folder, so the jobs may have been unable to report the error.
         echo(

@@ -471,6 +471,16 @@ def test_checks_and_validity_are_printed_separately_after_a_run(tiny, capsys):
     assert "asperities in slopes, single" in statements[0]
 
 
+def test_the_signal_that_killed_a_job_is_printed(tmp_path, capsys):
+    lines = ["Building DAG", "Command 'python …' died with <Signals.SIGKILL: 9>.", "[date]", "Error in rule run_0:"]
+    (tmp_path / "snakemake.log").write_text("\n".join([*lines, *(f"job {k}" for k in range(20))]))
+    progress = SimpleNamespace(called=0, finished={"a"})
+    run = sys.modules["icha.cli.run"]
+    assert run._print_reasons(tmp_path, tmp_path / "snakemake.log", 0, progress, stopped=False) == []
+    out = capsys.readouterr().out
+    assert out.startswith("Snakemake could not continue:\n") and "SIGKILL: 9" in out and "Error in rule run_0" in out
+
+
 def test_truncated_files_are_computed_again(tiny):
     campaign, results = tiny
     whole, cut, empty, _ = campaign_files(campaign).runs
