@@ -13,6 +13,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from icha.cli import app
+from icha.deposit.verify import CRATE
 from icha.report.explorer import encode_map, encode_run, encode_topography, find_partners, write_explorer
 
 
@@ -204,7 +205,7 @@ def test_the_command_writes_the_page_and_refuses_wrong_calls(folder, tmp_path):
     assert (tmp_path / "again.html").read_bytes() == (tmp_path / "own.html").read_bytes()
     for name in ("empty", "deposit", "missing/dataset"):
         (tmp_path / name).mkdir(parents=True)
-    (tmp_path / "deposit/SHA256SUMS").write_text("")
+    (tmp_path / "deposit" / CRATE).write_text("")
     (tmp_path / "missing/dataset/small.nc").symlink_to(folder / "dataset/small.nc")
     for arguments, reason in (
         ([tmp_path / "nowhere"], "nowhere has no campaign dataset"),
