@@ -77,6 +77,7 @@ class Results:
         if reason := find_conflict(self.folder, self._origin):
             raise SystemExit(f"{reason} Nothing was computed.")
         reports = dry_run or any(REPORTING.fullmatch(argument.partition("=")[0]) for argument in sys.argv[1:])
+        self._reports = reports
         self._other_process = None if reports else hold_lock(f".snakemake/{self.folder.name}.lock")
         try:
             wrong = dict(outdated(stamps))
@@ -119,7 +120,9 @@ class Results:
         note_versions(self.folder)
 
     def remove_left_over(self) -> None:
-        """Remove temporary files of killed programs from the results."""
+        """Remove temporary files of killed programs from the results; without the lock, they may be in use."""
+        if self._reports or self._other_process:
+            return
         for folder, _, names in os.walk(self.folder):
             for name in filter(is_left_over, names):
                 Path(folder, name).unlink(missing_ok=True)

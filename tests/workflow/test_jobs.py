@@ -62,7 +62,7 @@ def batch(monkeypatch, tmp_path):
     monkeypatch.syspath_prepend(str(REPOSITORY / "workflow/scripts"))
     from job import compute_batch
 
-    def compute(*programs, failing=None):
+    def compute(*programs, failing=None, present=None):
         computed = []
 
         def task(output, attributes):
@@ -75,7 +75,7 @@ def batch(monkeypatch, tmp_path):
         stamps = [dict.fromkeys(NAMES, "same") | {"program_sha256": program} for program in programs]
         arguments = [{"attributes": stamp} for stamp in stamps]
         try:
-            compute_batch(outputs, arguments, task)
+            compute_batch(outputs, arguments, task, lambda each: present or each["attributes"]["program_sha256"])
         except OSError:
             computed.append("failed")
         return computed
@@ -93,6 +93,11 @@ def test_a_batch_computes_only_files_without_the_expected_stamp(batch, tmp_path)
     os.truncate(tmp_path / "c.nc", (tmp_path / "c.nc").stat().st_size // 2)
     (tmp_path / "a.nc").unlink()
     assert batch("1", "2", "1") == ["a", "c"]
+
+
+def test_a_batch_refuses_a_program_that_changed_after_planning(batch):
+    with pytest.raises(ValueError, match="the program has changed since the campaign started; repeat the command"):
+        batch("1", "1", "1", present="2")
 
 
 def test_the_files_before_an_error_of_the_machine_are_kept(batch, tmp_path):

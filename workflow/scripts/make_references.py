@@ -2,8 +2,9 @@
 
 from job import compute_batch, job_context
 
+from icha.datasets.stamp import program_of_theories
 from icha.tasks.theories import make_theories
 
 if "snakemake" in globals():
     with job_context(snakemake):
-        compute_batch(snakemake.output, snakemake.params.files, make_theories)
+        compute_batch(snakemake.output, snakemake.params.files, make_theories, lambda each: program_of_theories())

@@ -2,8 +2,9 @@
 
 from job import compute_batch, job_context
 
+from icha.datasets.stamp import program_of_surfaces
 from icha.tasks.surface import make_surface
 
 if "snakemake" in globals():
     with job_context(snakemake):
-        compute_batch(snakemake.output, snakemake.params.files, make_surface)
+        compute_batch(snakemake.output, snakemake.params.files, make_surface, lambda each: program_of_surfaces())

@@ -4,9 +4,17 @@ from functools import partial
 
 from job import compute_batch, job_context
 
+from icha.contact.models import DEFAULT_MODEL
+from icha.datasets.stamp import program_of_runs
 from icha.tasks.run import compute_run
+
+
+def program(run):
+    """Return the fingerprint of the program that computes a run."""
+    return program_of_runs(run.get("model", DEFAULT_MODEL))
+
 
 if "snakemake" in globals():
     with job_context(snakemake):
         progress = partial(print, flush=True)
-        compute_batch(snakemake.output, snakemake.params.files, partial(compute_run, progress=progress))
+        compute_batch(snakemake.output, snakemake.params.files, partial(compute_run, progress=progress), program)
