@@ -21,6 +21,7 @@ from hypothesis import settings
 from snakemake.cli import main
 
 import icha
+import icha.support.fingerprint
 
 REPOSITORY = Path(__file__).parents[1]
 PARTS = ("Snakefile", "icha", "workflow", "config", "profiles", ".gitignore", "Makefile", "LICENSE")
@@ -106,6 +107,9 @@ def _call(project, arguments, environment, output):
     icha.__path__[:] = icha.__spec__.submodule_search_locations[:] = [str(project / "icha")]
     for file in (REPOSITORY / "workflow").glob("*.py"):
         sys.modules.pop(file.stem, None)
+    # Tests of this process may have computed fingerprints of the repository.
+    for function in vars(icha.support.fingerprint).values():
+        getattr(function, "cache_clear", lambda: None)()
     main(arguments[1:])
 
 
