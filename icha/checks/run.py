@@ -45,8 +45,8 @@ _OF_STATES = {
     "front": OF_MODELS["front_residual"].long_name,
     "gap": OF_MODELS["gap_residual"].long_name,
     "converged": "number of steps that did not converge",
-    "targets": "largest relative difference between the value of a step and its target, beyond two cells or a tenth of an "
-    "area that is counted in cells (boundary elements without adhesion or at a finite range)",
+    "targets": "largest relative difference between the value of a step and its target, beyond two cells or a tenth of "
+    "an area that is counted in cells (boundary elements without adhesion or at a finite range)",
     "area rises": "largest decrease of A/A0 in the first loading, from target to target or in a step without unions "
     "and jumps, divided by the largest A/A0",
     "pressure rises": "largest decrease of the nominal pressure in the first loading, from target to target or in a "
