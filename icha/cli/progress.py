@@ -33,7 +33,8 @@ _PR_SET_PDEATHSIG = 1  # of prctl(2)
 class Progress:
     """Files of a campaign that a call of Snakemake computes.
 
-    A file counts as finished if its modification time has changed since this object was made.
+    A file counts as finished if its modification time has changed since this object was made. Files that the jobs keep
+    do not count, although Snakemake changes their times.
     """
 
     def __init__(self, items: Iterable[Item], results: Path, cores: int):
@@ -45,7 +46,7 @@ class Progress:
         results : folder of the results.
         cores : number of cores in use.
         """
-        self._work = {str(results / item.path): item.work for item in items}
+        self._work = {str(results / item.path): item.work for item in items if item.may_be_written}
         self.expected = {str(results / item.path) for item in items if item.to_do}
         self._before = {path: _time_of(path) for path in self._work}
         self._cores, self._start = cores, time.monotonic()

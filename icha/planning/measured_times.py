@@ -20,7 +20,10 @@ def correct_costs(
     pairs: dict[tuple[str, str], list[tuple[float, float]]] = {}
     for batch in run_batches(campaign, runs):
         case = runs[batch.files[0]]
-        expected = {path: cost_of[runs[path]].seconds for path in batch.files}
+        # A line of the log for each computed file (workflow/scripts/job.py).
+        expected = {
+            f": {campaign.name}/{path.removesuffix('.nc')}\n": cost_of[runs[path]].seconds for path in batch.files
+        }
         pairs.setdefault((case.study, case.model), []).extend(_measured_time(results, batch.name, expected))
     factors = {key: costs.correction(each) for key, each in pairs.items()}
     return {
@@ -29,14 +32,15 @@ def correct_costs(
 
 
 def _measured_time(results: Path, batch: str, expected: Mapping[str, float]) -> Iterator[tuple[float, float]]:
-    """Yield expected and measured time of the last job of a batch; `expected` has the expected time of each file, s."""
+    """Yield expected and measured time of the last job of a batch.
+
+    `expected` is the expected time of each file, s, by the text of the file in the log. Kept files are not in the log.
+    """
     try:
-        file = results / "benchmarks/runs" / f"{batch}.jsonl"
-        seconds = float(json.loads(file.read_bytes())["s"])
-        # Files that the job has kept are older.
-        begin = file.stat().st_mtime - seconds - 1.0
-        computed = [path for path in expected if (results / path).stat().st_mtime >= begin]
+        seconds = float(json.loads((results / "benchmarks/runs" / f"{batch}.jsonl").read_bytes())["s"])
+        log = (results / "logs/runs" / f"{batch}.log").read_text(encoding="utf-8", errors="replace")
     except (OSError, ValueError, KeyError, TypeError):
         return
+    computed = [each for text, each in expected.items() if text in log]
     if computed and seconds > 0:
-        yield costs.JOB + sum(expected[path] for path in computed), seconds
+        yield costs.JOB + sum(computed), seconds

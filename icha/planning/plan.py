@@ -68,6 +68,11 @@ class Item:
         return self.state in (TO_DO, OUTDATED)
 
     @property
+    def may_be_written(self) -> bool:
+        """True if a call may write the file; a file with the expected stamp is kept."""
+        return self.to_do or self.part not in (SURFACES, RUNS, THEORIES)
+
+    @property
     def work(self) -> float:
         """Expected work in core-seconds, with the share of the file in the start of its job."""
         return (self.cost.seconds + self.start * costs.JOB) * self.threads

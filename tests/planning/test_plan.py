@@ -1,7 +1,6 @@
 """The plan contains every file with its cost, and names what the machine lacks."""
 
 import json
-import os
 
 import numpy as np
 import pytest
@@ -98,12 +97,11 @@ def test_measured_times_of_a_batch_correct_the_times_of_its_study(campaign, tmp_
         return {item.path: item.cost.seconds for item in plan(campaign, tmp_path) if item.part == RUNS}
 
     before, (batch, *_) = seconds(), run_batches(campaign, campaign_files(campaign).runs)
-    for path in batch.files:
-        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / path).touch()
-    # The job has kept one of the files.
-    kept, *computed = batch.files
-    os.utime(tmp_path / kept, (0, 0))
+    # The job has kept the first file, which is not in its log.
+    _, *computed = batch.files
+    log = tmp_path / f"logs/runs/{batch.name}.log"
+    log.parent.mkdir(parents=True)
+    log.write_text("".join(f"2 of 4: {campaign.name}/{path.removesuffix('.nc')}\n" for path in computed))
     expected = JOB + sum(before[path] for path in computed)
     benchmark = tmp_path / f"benchmarks/runs/{batch.name}.jsonl"
     benchmark.parent.mkdir(parents=True)
