@@ -76,9 +76,8 @@ class Results:
         self.folder, self._origin = Path(folder), Path(file).resolve()
         if reason := find_conflict(self.folder, self._origin):
             raise SystemExit(f"{reason} Nothing was computed.")
-        reports = dry_run or any(REPORTING.fullmatch(argument.partition("=")[0]) for argument in sys.argv[1:])
-        self._reports = reports
-        self._other_process = None if reports else hold_lock(f".snakemake/{self.folder.name}.lock")
+        self._reports = dry_run or any(REPORTING.fullmatch(argument.partition("=")[0]) for argument in sys.argv[1:])
+        self._other_process = None if self._reports else hold_lock(f".snakemake/{self.folder.name}.lock")
         try:
             wrong = dict(outdated(stamps))
         except OSError as error:
@@ -87,7 +86,7 @@ class Results:
             first, reason = next(iter(wrong.items()))
             others = f" and {format_count(len(wrong) - 1, 'more result')}" if len(wrong) > 1 else ""
             logger.warning(f"outdated, to be computed again: {first} ({reason}){others}")
-        if not reports and not self._other_process:
+        if not self._reports and not self._other_process:
             for path in wrong:
                 with _report_unwritable(os.path.dirname(path)):
                     os.unlink(path)

@@ -305,7 +305,8 @@ class Campaign(Section):
             side = getattr(self._grid_and_period(name), "period", None)
             if side is None or not self.surfaces[name].shape:
                 continue
-            for location, a in self.contact_radii(study, name, label).items():
+            radii = self.contact_radii(study, name, label)
+            for location, a in radii.items():
                 # Roughness may prevent the jump-in of the smooth shape.
                 if 2 * a > side and (location or self.surfaces[name].smooth):
                     radius, given, least = (formatting.length(each, 3) for each in (a, side, 3 * a))
@@ -314,10 +315,15 @@ class Campaign(Section):
                     reason += f", but the square has the side {given}; expected a side of at least {least}"
                     yield location or ("surfaces",), values[location], f"{reason}, or smaller targets"
                     break
-            yield from self._jump_in_problems(study, name, label)
+            yield from self._jump_in_problems(study, name, label, radii)
 
-    def _jump_in_problems(self, study: Study, surface: str, material: str) -> Iterator[Problem]:
-        """Yield a problem for a target contact smaller than that of pull-off: a smooth sphere jumps over it."""
+    def _jump_in_problems(
+        self, study: Study, surface: str, material: str, radii: dict[tuple, float]
+    ) -> Iterator[Problem]:
+        """Yield a problem for a target contact smaller than that of pull-off: a smooth sphere jumps over it.
+
+        `radii` are those of `contact_radii`.
+        """
         from icha.references.indentation import pull_off_state
 
         section, adhesive = self.surfaces[surface], self.materials[material]
@@ -325,16 +331,11 @@ class Campaign(Section):
         if not (section.smooth and shape.sphere_radius and adhesive.surface_energy and adhesive.thickness is None):
             return
         radius = float(pull_off_state(shape, adhesive.contact_modulus, adhesive.surface_energy).contact_radius)
-        smallest = formatting.length(radius, 3)
-        radii = self.contact_radii(study, surface, material)
+        reason = f"lies inside the jump into contact of {material!r} on {surface!r}, which pulls off from a"
+        reason += f" contact radius of {formatting.length(radius, 3)}; expected larger contacts, or `indentations`"
         for location, kind, value in study.states():
             if location[0] == "targets" and kind in AREAS and radii[location] < radius:
-                reason = f"lies inside the jump into contact of {material!r} on {surface!r}, which pulls off from a"
-                yield (
-                    location,
-                    value,
-                    f"{reason} contact radius of {smallest}; expected larger contacts, or `indentations`",
-                )
+                yield location, value, reason
                 return
 
     def resolve_paths(self, folder: FilePath) -> Campaign:

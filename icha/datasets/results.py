@@ -49,14 +49,3 @@ class ResultFiles:
         """Return the path of one file from a pattern; `case` and `names` give the values of names in braces."""
         of_case = {} if case is None else labels.path_fields(case)
         return "/".join(filter(None, (self.folder, pattern.format(campaign=self.campaign, **of_case, **names))))
-
-
-def job_file(path: str, kind: str, ending: str) -> str:
-    """Return the path of the log file or benchmark file of the job that makes a file.
-
-    Parameters
-    ----------
-    path : path of the file, relative to the folder of results.
-    kind, ending : folder and file extension: either `logs` and `.log`, or `benchmarks` and `.jsonl`.
-    """
-    return f"{kind}/{path.rpartition('.')[0]}{ending}"

@@ -48,21 +48,7 @@ class CampaignFiles:
     @property
     def computed(self) -> list[str]:
         """Paths of all results except the copy of the configuration, the checksums and the deposit."""
-        return [
-            *self.surfaces,
-            *self.runs,
-            *self.theories,
-            self.dataset,
-            self.table,
-            self.comparison,
-            *self.model_error,
-            *self.answers,
-            *self.sensitivity,
-            self.checks,
-            self.verdict,
-            *self.figures,
-            self.report,
-        ]
+        return [*self.verified, self.checks, self.verdict, *self.figures, self.report]
 
     @property
     def verified(self) -> list[str]:
