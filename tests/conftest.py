@@ -3,7 +3,6 @@
 import contextlib
 import fcntl
 import gc
-import multiprocessing
 import os
 import re
 import shutil
@@ -18,10 +17,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import pytest
 from hypothesis import settings
-from snakemake.cli import main
-
-import icha
-import icha.support.fingerprint
+from snakemake_calls import call_snakemake
 
 REPOSITORY = Path(__file__).parents[1]
 PARTS = ("Snakefile", "icha", "workflow", "config", "profiles", ".gitignore", "Makefile", "LICENSE")
@@ -77,40 +73,12 @@ def snakemake_command(*arguments, configuration=SMOKE):
 
 
 def snakemake(project, *arguments, configuration=SMOKE):
-    """Call Snakemake in a copy of the project; return the finished process with its output as `stdout`.
-
-    The call is a fork of this process, which has imported Snakemake. So a dry run takes a fifth of the time of a new
-    process.
-    """
+    """Call Snakemake in a copy of the project; return the finished process with its output as `stdout`."""
     command, environment = snakemake_command(*arguments, configuration=configuration)
     environment["PYTHONPATH"] = str(project)
-    with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as output:
-        arguments = project, command[2:], environment, output
-        call = multiprocessing.get_context("fork").Process(target=_call, args=arguments)
-        call.start()
-        call.join()
-        output.seek(0)
-        return subprocess.CompletedProcess(command, call.exitcode, output.read())
-
-
-def _call(project, arguments, environment, output):
-    """Run Snakemake in this process, with the modules of a copy of the project."""
-    for descriptor in (1, 2):
-        os.dup2(output.fileno(), descriptor)
-    sys.stdout, sys.stderr = (open(descriptor, "w", buffering=1, encoding="utf-8") for descriptor in (1, 2))
-    os.chdir(project)
-    os.environ.clear()
-    os.environ.update(environment)
-    sys.argv = arguments
-    sys.path[:0] = [str(project)]
-    icha.__file__ = icha.__spec__.origin = str(project / "icha/__init__.py")
-    icha.__path__[:] = icha.__spec__.submodule_search_locations[:] = [str(project / "icha")]
-    for file in (REPOSITORY / "workflow").glob("*.py"):
-        sys.modules.pop(file.stem, None)
-    # Tests of this process may have computed fingerprints of the repository.
-    for function in vars(icha.support.fingerprint).values():
-        getattr(function, "cache_clear", lambda: None)()
-    main(arguments[1:])
+    with tempfile.NamedTemporaryFile("w+", encoding="utf-8", errors="replace") as output:
+        code = call_snakemake(project, command[2:], environment, output.name)
+        return subprocess.CompletedProcess(command, code, output.read())
 
 
 def smaller_smoke():
