@@ -62,7 +62,6 @@ localrules:
     configuration,
     analyse,
     verdict,
-    figure,
     report_page,
     deposit,
 

@@ -178,7 +178,7 @@ def _limit(row, shares):
             "parameters would narrow it; more seeds would not."
         )
     if not total:
-        return "The seeds do not differ."
+        return "The seeds do not differ, and no other error is known."
     if grid > max(variances.values()):
         return (
             f"The grid limits the accuracy: ± {100 * math.sqrt(grid):.2g} % of the value. A finer grid would narrow it."

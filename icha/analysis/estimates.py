@@ -31,7 +31,7 @@ from icha.datasets.campaign import loading_stops
 from icha.datasets.labels import LABELS, coarse_study, inputs_study, is_derived_study, slopes_at
 from icha.datasets.variables.answers import ANSWERS
 from icha.datasets.variables.run import OF_LOSS
-from icha.path.targets import ESTIMATED_AT_TARGETS, ESTIMATED_OF_LOOPS, OF_SQUARES, SIGNED
+from icha.path.targets import ESTIMATED_AT_TARGETS, ESTIMATED_OF_LOOPS, OF_ADHESION, OF_SQUARES, SIGNED
 
 LOOP = "loop"
 
@@ -78,7 +78,10 @@ def _answers(
     levels |= {"fine": (study, REFERENCE_MODEL)}
     runs = study.sel(model=REFERENCE_MODEL)
     of_runs = cells_of_length(runs), nodes_of(runs)
-    lengths, nodes = (each.broadcast_like(runs["status"]).min("seed").transpose(*CONTACT).values for each in of_runs)
+    of_runs += (runs["surface_energy"],)
+    lengths, nodes, energies = (
+        each.broadcast_like(runs["status"]).min("seed").transpose(*CONTACT).values for each in of_runs
+    )
     every = (*ESTIMATED_AT_TARGETS, *ESTIMATED_OF_LOOPS)
     for (kind, target), quantity in itertools.product([*stops_of(study), (LOOP, 0.0)], every):
         prescribed = kind in ESTIMATED_AT_TARGETS.get(quantity, ())
@@ -91,6 +94,8 @@ def _answers(
         for place in itertools.product(*(range(study.sizes[dim]) for dim in CONTACT)):
             if quantity in OF_SQUARES and not known[place[0]]:
                 continue  # a periodic surface
+            if quantity in OF_ADHESION and not energies[place] > 0:
+                continue
             by_seed, left_out, note = _levels_at(values, place)
             if any(math.isinf(value) for level in by_seed.values() for value in level.values()):
                 continue  # the stiffness of full contact

@@ -18,6 +18,8 @@ SENSITIVITY = "aggregated/sensitivity.nc"
 CHECKS = "checks.json"
 VERDICT = "verdict.txt"
 FIGURE = "figures/{name}.{ending}"
+# A figure as a picture and as a drawing, and its caption.
+FIGURE_ENDINGS = ("png", "pdf", "txt")
 REPORT = "report.html"
 EXPLORER = "explore.html"
 RUN_TIMES = "run_times.tsv"

@@ -31,7 +31,7 @@ def campaign_steps(campaign: Campaign, given: Sequence[str], source: Path) -> li
         "references": ("make_references.py", [files.configuration, *files.surfaces], files.theories),
         "analyse": ("analyse.py", files.runs, [*analysis, files.table]),
         "verdict": ("judge_results.py", [files.checks], [files.verdict]),
-        "figures": ("draw_figure.py", [*inputs, *analysis, *files.surfaces, *files.theories], files.figures),
+        "figures": ("draw_figures.py", [*inputs, *analysis, *files.surfaces, *files.theories], files.figures),
         "report": ("make_report.py", [*inputs, *analysis, *files.surfaces, *files.figures], [files.report]),
     }
     return [

@@ -256,7 +256,7 @@ def summarise_loop(
         "pull_off_separation": rows[pull_off_row]["mean_separation"],
         "pull_off_over_strength": tension / material.interface_strength if adhesive else 0.0,
         "pull_off_over_summits": tension / summit_pull_off_pressure if summit_pull_off_pressure else 0.0,
-        "detachment_pressure": touching["nominal_pressure"],
+        "detachment_pressure": touching["nominal_pressure"] if adhesive else 0.0,
         "detachment_separation": touching["mean_separation"],
         "hysteresis_loss": loss,
         "hysteresis_loss_over_surface_energy": loss / material.surface_energy if adhesive else 0.0,

@@ -6,17 +6,21 @@ of the seeds, so that a new seed at the end of the list changes only the last ba
 because the batches of finished results must stay the same.
 """
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple, TypeVar
 
 from icha.configuration.campaign import Campaign
 from icha.datasets.labels import RunLabels
+from icha.figures.registry import figure_number
 from icha.planning import costs
 from icha.planning.requirements import is_resumable, run_threads, surface_threads
 from icha.planning.run_costs import run_costs
 
 # Smallest number of batches of a group, unless they would be shorter than a fifth of `costs.BATCH`.
 _FEWEST = 4
+# Largest number of figures in a batch.
+_MOST_FIGURES = 6
 # Largest number of files in a batch. Snakemake's time for planning is proportional to the number.
 _MOST_FILES = 60
 T = TypeVar("T")
@@ -61,6 +65,14 @@ def run_batches(campaign: Campaign, runs: Mapping[str, RunLabels]) -> list[Batch
         )
         for path, case in _by_seed(runs, lambda case: (case.study, case.seed))
     )
+
+
+def figure_batches(names: Iterable[str]) -> list[list[str]]:
+    """Return the names of figures by batch. An own figure is alone, because its script may fail."""
+    numbered = [name for name in names if figure_number(name)]
+    count = max(_FEWEST // 2, math.ceil(len(numbered) / _MOST_FIGURES))
+    batches = [numbered[k::count] for k in range(count)]
+    return [*filter(None, batches), *([name] for name in names if not figure_number(name))]
 
 
 def _by_seed(files: Mapping[str, T], labels: Callable[[T], tuple[str, int]]) -> list[tuple[str, T]]:

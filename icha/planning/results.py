@@ -97,7 +97,7 @@ def campaign_files(campaign: Campaign, folder: str = "") -> CampaignFiles:
         figures=[
             path(results.FIGURE, name=name, ending=ending)
             for name in campaign.figures.by_name()
-            for ending in ("png", "pdf", "txt")
+            for ending in results.FIGURE_ENDINGS
         ],
         report=path(results.REPORT),
         run_times=path(results.RUN_TIMES),

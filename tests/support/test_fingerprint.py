@@ -58,7 +58,7 @@ def test_scripts_count_with_the_modules_that_they_import(tmp_path):
         prints[text] = fingerprint(script=script)
     assert len(set(prints.values())) == len(prints)
     assert "icha.figures.style" in {*imported_modules("icha.figures.registry")}
-    draws = REPOSITORY / "workflow/scripts/draw_figure.py"
+    draws = REPOSITORY / "workflow/scripts/draw_figures.py"
     assert fingerprint("icha.figures.fig1_jkr", script=draws) != fingerprint("icha.figures.fig13_loops", script=draws)
 
 

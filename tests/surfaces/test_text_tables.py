@@ -509,3 +509,14 @@ def test_titles_that_are_not_known_are_asked_about(tmp_path, titles):
     path = written(tmp_path, text(points(), ",", ["x (px),y (px),z (nm)"]))
     with refused("lateral_unit", "does not contain the unit of its coordinates"):
         read(path, size=None)
+
+
+@pytest.mark.parametrize("line", ["# Z axis: down", "Z-Axis direction = inverted", "polarity: depth positive"])
+def test_numbers_that_increase_downwards_are_not_read_as_heights(tmp_path, line):
+    path = written(tmp_path, text(rows(), heading=[line]))
+    with pytest.raises(UnfitTopography, match="valleys") as refusal:
+        read(path)
+    assert refusal.value.key == "touches_first"
+    turned = read(path, touches_first="low").surface.heights / NM
+    np.testing.assert_allclose(np.ptp(turned), np.ptp(HEIGHTS), rtol=1e-9)
+    assert np.corrcoef(turned.ravel(), HEIGHTS.ravel())[0, 1] < 0

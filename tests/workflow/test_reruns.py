@@ -13,9 +13,9 @@ import pytest
 from conftest import REPOSITORY, SMOKE, copy_project, snakemake
 from tiny_campaign import CAMPAIGN
 
-AFTER_RUNS = {"analyse", "verdict", "figure", "report_page"}
+AFTER_RUNS = {"analyse", "verdict", "draw_figures", "report_page"}
 # Beginnings of the names of rules of batches.
-BATCHES = ("make_surfaces", "compute_theories", "run")
+BATCHES = ("make_surfaces", "compute_theories", "run", "draw_figures")
 
 
 def planned(project, *arguments):
@@ -85,7 +85,7 @@ def test_comments_docstrings_formatting_and_touch_run_nothing_nor_does_a_fresh_c
         ("icha/asperity/jkr.py", {"run", "compute_theories", *AFTER_RUNS}, 27 + 2),
         ("icha/surfaces/spectrum.py", {"make_surfaces", "run", "compute_theories", *AFTER_RUNS}, 3 + 27 + 2),
         ("icha/analysis/estimates.py", AFTER_RUNS, 0),
-        ("icha/figures/fig13_loops.py", {"figure", "report_page"}, 0),
+        ("icha/figures/fig13_loops.py", {"draw_figures", "report_page"}, 0),
     ],
 )
 def test_a_new_statement_computes_again_what_its_module_computes(path, rules, outdated, own, edit):
@@ -100,7 +100,7 @@ def test_a_new_statement_computes_again_what_its_module_computes(path, rules, ou
         ({"license: CC-BY-4.0": "license: CC0-1.0"},
          {"configuration", "make_surfaces", "compute_theories", "run", *AFTER_RUNS}, 3 + 27 + 2),
         ({"25 MPa": "25000 kPa", "fig1_jkr: {}": "fig1_jkr: {tabor_parameter: 4}"},
-         {"configuration", "figure", "report_page"}, 0),
+         {"configuration", "draw_figures", "report_page"}, 0),
         # The references contain curves of Fuller & Tabor for each material.
         ({"2 mJ/m^2": "3 mJ/m^2"}, {"configuration", "compute_theories", "run", *AFTER_RUNS}, 3 + 1 + 1),
         ({"seeds: [1, 2]": "seeds: [1, 2, 3]"}, {"configuration", "make_surfaces", "run", *AFTER_RUNS}, 0),
@@ -114,7 +114,7 @@ def test_a_changed_value_computes_again_what_depends_on_it(changes, rules, outda
 
 def test_published_points_outdate_references_and_no_run(own, edit):
     edit("icha/references/literature.json", "0.185", "0.186")
-    assert planned(own) == ({"compute_theories", "verdict", "figure", "report_page"}, 2)
+    assert planned(own) == ({"compute_theories", "verdict", "draw_figures", "report_page"}, 2)
 
 
 def computed(project):

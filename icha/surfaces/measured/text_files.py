@@ -78,6 +78,9 @@ _REMARKS = re.compile(
 # A number alone, or a number and a unit of length.
 _VALUE = re.compile(rf"{_NUMBER}\s*(\S*)")
 _MEANINGS = {name: meaning for meaning, names in _NAMES.items() for name in names.split("|")}
+# An entry that states in which direction the numbers increase, and values that mean downwards.
+_DIRECTION = re.compile(r"\bz\b.*(axis|direction|achse)|polarity|height direction")
+_DOWNWARDS = re.compile(r"down|invert|depth|unten", re.IGNORECASE)
 # Number for a missing height in grids by ESRI, if the heading does not define another number.
 _ESRI_MISSING = -9999.0
 
@@ -119,7 +122,7 @@ def read_matrix(file: SourceFile, settings: Preparation) -> FileContent:
                 "Remove these delimiters, or write nan for missing heights",
             )
     size, coordinates = heading.find_size(heights.shape, settings)
-    remark, unit = unused_factors(heading.entries, settings), heading.find_height_unit(settings)
+    remark, unit = heading.unused_factors(settings), heading.find_height_unit(settings)
     return FileContent(heading.mark_missing(heights), unit, size, coordinates, remark=remark)
 
 
@@ -176,7 +179,7 @@ def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
     lateral_unit = heading.find_lateral_unit(settings)
     x_unit, y_unit = x_unit or lateral_unit, y_unit or lateral_unit
     named = "columns x {}, y {}, z {} by their names".format(*columns)
-    remarks = named if titled and columns != sorted(columns) else "", unused_factors(heading.entries, settings)
+    remarks = named if titled and columns != sorted(columns) else "", heading.unused_factors(settings)
     size = (nx * dx * x_unit, ny * dy * y_unit) if x_unit and y_unit and settings.lateral_unit is None else None
     return FileContent(
         heights.reshape(ny, nx),
@@ -311,6 +314,17 @@ class _Heading:
                     )
                 agreed.add(axis)
         return len(agreed) == 2
+
+    def unused_factors(self, settings: Preparation) -> str:
+        """Return factors of the heights that are not applied; raise an error if the numbers increase downwards."""
+        for name, value, line in self.entries:
+            if settings.touches_first == "high" and _DIRECTION.search(name) and _DOWNWARDS.search(value):
+                raise UnfitTopography(
+                    "touches_first",
+                    f"is 'high', but the heading states {line.strip()[:60]!r}, so that points with high numbers are "
+                    "valleys; expected 'low'. If the numbers increase upwards, remove this line from the file",
+                )
+        return unused_factors(self.entries, settings)
 
     def find_height_unit(self, settings: Preparation) -> float | None:
         """Return the unit of the heights, m; None without a unit."""
