@@ -64,11 +64,11 @@ class Page:
         """Wait until the page has drawn what it was told to."""
         self.value("new Promise((go) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(go, 50))))")
 
-    def show(self, width, height=900, scheme="light"):
-        """Set the size of the window, and the scheme of colours that the reader prefers."""
+    def show(self, width, height=900, scheme="light", medium=""):
+        """Set the size of the window, the scheme of colours that the reader prefers, and the medium, such as print."""
         self._call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
         features = [{"name": "prefers-color-scheme", "value": scheme}]
-        self._call("Emulation.setEmulatedMedia", features=features)
+        self._call("Emulation.setEmulatedMedia", media=medium, features=features)
         self.settle()
 
     def value(self, expression):

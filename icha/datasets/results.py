@@ -22,7 +22,6 @@ FIGURE = "figures/{name}.{ending}"
 FIGURE_ENDINGS = ("png", "pdf", "txt")
 REPORT = "report.html"
 EXPLORER = "explore.html"
-RUN_TIMES = "run_times.tsv"
 CONFIGURATION = "config.used.yaml"
 # Seeds that ICHA has chosen for the studies with `accuracy`.
 CHOSEN_LEVELS = "levels.yaml"

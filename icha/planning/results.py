@@ -41,7 +41,6 @@ class CampaignFiles:
     checksums: str
     figures: list[str]
     report: str
-    run_times: str
     configuration: str
     deposit: str
 
@@ -100,7 +99,6 @@ def campaign_files(campaign: Campaign, folder: str = "") -> CampaignFiles:
             for ending in results.FIGURE_ENDINGS
         ],
         report=path(results.REPORT),
-        run_times=path(results.RUN_TIMES),
         configuration=path(results.CONFIGURATION),
         deposit=path(results.DEPOSIT, version=campaign.deposit_metadata().version or "without_version"),
     )

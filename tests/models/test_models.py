@@ -174,10 +174,9 @@ def test_asperities_end_at_the_limit_of_their_range_beside_boundary_elements(tmp
     known = np.isfinite(errors["contact_area_fraction"].values.ravel())
     assert known.tolist() == [True, True, False]
     write_dataset(xr.DataTree.from_dict({"/one": errors.to_dataset()}), tmp_path / "model_error.nc")
-    # The loops of the report are those of the runs that were unloaded.
     write_report(tmp_path / "report.html", campaign=tree, figures=[], checks=check_campaign(tree))
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "<b>1</b> of the complete runs ends at the limit of the model" in page and "Failed runs" not in page
+    assert "<b>1</b> of them ended at the limit of the model" in page and "Failures" not in page
 
 
 def test_fronts_are_checked(runs):

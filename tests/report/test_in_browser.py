@@ -14,11 +14,11 @@ from PIL import Image
 from icha.analysis.checks import check_campaign
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.surface_file import write_surface
-from icha.figures import fig1_jkr, fig2_area_and_gap
+from icha.figures import fig2_area_and_gap
 from icha.figures.style import save
 from icha.report.explorer import write_explorer
-from icha.report.report import ReportFigure, write_report
-from icha.report.sections import read_surface_statistics
+from icha.report.report import write_report
+from icha.report.spectra import read_surface_statistics
 
 pytestmark = WANTED
 
@@ -32,28 +32,22 @@ def explorer_file(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def report_file(tmp_path_factory):
-    """A report with figures and a failed run, in a folder as results have it."""
+    """A report with a figure and a failed run, in a folder as results have it."""
     folder = tmp_path_factory.mktemp("report")
     runs = list(small.runs())
     runs[1] = (runs[1][0], runs[1][1].assign_attrs(incomplete="no equilibrium at the second stop"))
     tree = campaign_tree(runs, attrs={"title": "Small campaign", "license": "CC0-1.0"})
     write_surface(folder / "s.nc", small.surface(), name="rough", seed=1, spectrum=small.SPECTRUM)
-    pictures = []
-    for name, figure, studies in (
-        ("fig1_jkr", fig1_jkr.figure(), ()),
-        ("fig2_area_and_gap", fig2_area_and_gap.figure(tree, study="slopes"), ("slopes",)),
-    ):
-        files = [folder / "figures" / f"{name}.{ending}" for ending in ("png", "pdf", "txt")]
-        save(figure, *files[:2])
-        files[2].write_text(f"Caption of {name}.\n")
-        pictures.append(ReportFigure(name, *files, studies))
+    files = [folder / f"figures/fig2_area_and_gap.{ending}" for ending in ("png", "pdf", "txt")]
+    save(fig2_area_and_gap.figure(tree, study="slopes"), *files[:2])
+    files[2].write_text("Caption.\n")
     write_report(
         folder / "report.html",
         campaign=tree,
-        figures=pictures,
+        figures=files,
         checks=check_campaign(tree),
         surfaces=[read_surface_statistics(folder / "s.nc")],
-        dataset_path=folder / "dataset" / "small.nc",
+        files={"Campaign dataset": folder / "dataset" / "small.nc"},
         results=folder,
     )
     return folder / "report.html"
@@ -246,54 +240,15 @@ def test_errors_and_requests_are_detected(browser, explorer_file, tmp_path):
 # --- the report -------------------------------------------------------------------------------------------------
 
 
-def test_figures_are_enlarged_by_a_click(report):
-    states = report.value("""(async () => {
-      const viewer = document.getElementById("viewer");
-      const pause = () => new Promise((go) => setTimeout(go, 200));
-      const image = () => viewer.querySelector("img");
-      const at = () => figures.findIndex((figure) => figure.querySelector("img").src === image().src);
-      const states = [viewer.open];
-      const state = () => states.push([viewer.open, at(), image().getBoundingClientRect().width]);
-      const key = (name) => viewer.dispatchEvent(new KeyboardEvent("keydown", {key: name}));
-      document.querySelectorAll("figure button")[1].click(); await pause(); state();
-      key("ArrowRight"); await pause(); state();
-      viewer.querySelector(".previous").click(); await pause(); state();
-      states.push(viewer.querySelector(".words").textContent.startsWith("Figure 2."));
-      states.push(document.querySelector("figure img").getBoundingClientRect().width);
-      image().click(); states.push(viewer.open);
-      return states;
-    })()""")
-    closed, one, following, before, caption, small_width, at_last = states
-    assert closed is at_last is False and caption is True
-    # The first figure follows the last one.
-    assert [state[:2] for state in (one, following, before)] == [[True, 1], [True, 0], [True, 1]]
-    assert one[2] > small_width
-
-
-def test_every_link_of_the_contents_leads_to_its_heading(report):
-    found = report.value("""(async () => {
-      document.documentElement.style.scrollBehavior = "auto";
-      const found = [];
-      for (const link of document.querySelectorAll("nav a")) {
-        link.click();
-        await new Promise((go) => setTimeout(go, 60));
-        const place = document.getElementById(link.hash.slice(1)).getBoundingClientRect();
-        const end = scrollY + innerHeight >= document.documentElement.scrollHeight - 2;
-        found.push([link.hash, place.top >= -1 && place.top < (end ? innerHeight : 120),
-                    document.querySelectorAll("nav a[aria-current]").length]);
-      }
-      return found;
-    })()""")
-    there = {at for at, *_ in found}
-    assert {"#failures", "#studies", "#study-slopes", "#surfaces", "#checks", "#data"} <= there
-    assert all(there and current == 1 for _, there, current in found), found
-
-
-def test_the_report_is_readable_on_a_telephone_and_in_the_dark(report):
-    report.show(500)
-    assert report.value("document.documentElement.scrollWidth <= innerWidth")
+def test_the_report_is_readable_on_a_telephone_in_the_dark_and_on_paper(report):
     colours = "[getComputedStyle(document.body).backgroundColor, getComputedStyle(document.body).color]"
-    paper, ink = map(brightness, report.value(colours))
-    other_paper, other_ink = map(brightness, report.value(f"(document.getElementById('theme').click(), {colours})"))
-    assert (paper - ink) * (other_paper - other_ink) < 0
-    assert min(abs(paper - ink), abs(other_paper - other_ink)) > 150
+    contrasts = []
+    for scheme, medium in (("light", ""), ("dark", ""), ("dark", "print")):
+        report.show(700 if medium else 400, scheme=scheme, medium=medium)
+        assert report.value("document.documentElement.scrollWidth <= innerWidth")
+        assert report.value("[...document.images].every((image) => image.complete && image.width > 300)")
+        paper, ink = map(brightness, report.value(colours))
+        contrasts.append(paper - ink)
+    light, dark, printed = contrasts
+    assert light > 150 and dark < -150 and printed > 150
+    assert report.value("getComputedStyle(document.querySelector('nav')).display") == "none"

@@ -16,7 +16,7 @@ from tiny_campaign import CAMPAIGN
 PYTHON = REPOSITORY / ".venv-slurm/bin/python"
 CONFIGURATION = "config/campaigns/tiny.yaml"
 # Files with measured times or versions.
-MEASURED = ("logs", "benchmarks", "run_times.tsv", "made_with.txt")
+MEASURED = ("logs", "benchmarks", "made_with.txt")
 
 
 def results_of(project):

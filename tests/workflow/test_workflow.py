@@ -40,7 +40,7 @@ def results_of(project):
     return {
         str(file.relative_to(folder)): hashlib.sha256(file.read_bytes()).hexdigest()
         for file in sorted(folder.rglob("*"))
-        if file.is_file() and file.relative_to(folder).parts[0] not in ("logs", "benchmarks", "run_times.tsv")
+        if file.is_file() and file.relative_to(folder).parts[0] not in ("logs", "benchmarks")
     }
 
 

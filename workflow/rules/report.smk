@@ -1,10 +1,11 @@
-# report.html: figures, tables, parameters and checks on one page. The same data always give exactly the same page. The
-# times of jobs are in a separate table, run_times.tsv, because times differ between executions.
+# report.html: statements, answers, checks, figures and parameters on one page. The same data always give exactly the
+# same page.
 
 
 rule report_page:
     input:
         campaign=FILES.dataset,
+        table=FILES.table,
         comparison=FILES.comparison,
         checks=FILES.checks,
         model_error=FILES.model_error,
@@ -15,7 +16,6 @@ rule report_page:
         figures=FILES.figures,
     output:
         page=FILES.report,
-        times=FILES.run_times,
     log:
         "<logs>/report.log",
     benchmark:
@@ -26,10 +26,8 @@ rule report_page:
         mem_mb=4000,
         runtime=10,
     params:
-        figures={name: options.studies_of(CAMPAIGN) for name, options in CAMPAIGN.figures.by_name().items()},
         citations=as_it_is([measurement.citation for measurement in CAMPAIGN.measurements.values()]),
-        benchmarks=f"{RESULTS}/benchmarks",
-        code=code_of("make_report.py", *(sorted({module_name(name) for name in CAMPAIGN.figures.by_name()}))),
+        code=code_of("make_report.py"),
     message:
         "Report"
     script:

@@ -1,4 +1,4 @@
-"""Write the report of a campaign, and a table of the times of its jobs."""
+"""Write the report of a campaign."""
 
 from pathlib import Path
 
@@ -6,37 +6,34 @@ from job import job_context
 
 from icha.analysis.checks import read_checks
 from icha.datasets.files import read_campaign
-from icha.report.report import ReportFigure, write_report
-from icha.report.run_times import write_times
-from icha.report.sections import read_surface_statistics
+from icha.report.report import write_report
+from icha.report.spectra import read_surface_statistics
 
 if "snakemake" in globals():
     with job_context(snakemake):
         files, params = snakemake.input, snakemake.params
-        page, times = snakemake.output.page, snakemake.output.times
-        model_error = "".join(files.model_error)  # empty without boundary elements
-        linked = {"Configuration": files.configuration, "Comparison": files.comparison, "Checks": files.checks}
-        answers = "".join(files.answers)  # empty without boundary elements for several seeds
-        sensitivity = "".join(files.sensitivity)  # empty without sampled parameters
-        linked |= {"Answers": answers} if answers else {}
-        linked |= {"Sampled cases": sensitivity} if sensitivity else {}
-        linked |= {"Times and memory of the jobs": times} | ({"Error of the model": model_error} if model_error else {})
-        campaign, errors = read_campaign(files.campaign), read_campaign(model_error) if model_error else None
-        figures = zip(params.figures.items(), *(files.figures[k::3] for k in range(3)), strict=True)
-        shown = [ReportFigure(name, *paths, tuple(studies)) for (name, studies), *paths in figures]
+        page = snakemake.output.page
+        # Absent without boundary elements, boundary elements for several seeds, or sampled parameters.
+        trees = {name: "".join(files[name]) for name in ("model_error", "answers", "sensitivity")}
+        linked = {
+            "Campaign dataset": files.campaign,
+            "Table of all runs": files.table,
+            "Comparison at common loads": files.comparison,
+            "Error of the asperity model": trees["model_error"],
+            "Answers": trees["answers"],
+            "Sampled cases": trees["sensitivity"],
+            "Checks": files.checks,
+            "Configuration": files.configuration,
+        }
         write_report(
             page,
-            campaign=campaign,
-            figures=shown,
+            campaign=read_campaign(files.campaign),
+            figures=files.figures,
             checks=read_checks(files.checks),
-            model_error=errors,
-            answers=read_campaign(answers) if answers else None,
-            sensitivity=read_campaign(sensitivity) if sensitivity else None,
+            **{name: read_campaign(path) if path else None for name, path in trees.items()},
             surfaces=[read_surface_statistics(path) for path in files.surfaces],
             configuration=Path(files.configuration).read_text(encoding="utf-8"),
-            dataset_path=files.campaign,
-            files=linked,
+            files={name: path for name, path in linked.items() if path},
             results=Path(page).parent,
             citations=params.citations,
         )
-        write_times(times, params.benchmarks)
