@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from icha.figures.curves import PRESSURE_LABEL
+from icha.datasets.quantities import label_of
 from icha.figures.ensembles import draw_points, points_handles
 from icha.figures.looks import legend_below, named_handles
 from icha.figures.style import (
@@ -119,7 +119,7 @@ def figure(error_sources: Sequence[xr.Dataset]) -> Figure:
     areas.set_ylabel(r"$A/A_{\mathrm{BEM}}$")
     separations.set_ylabel(r"$\bar{u}/\bar{u}_{\mathrm{BEM}}$")
     for axes in (areas, separations, shares):
-        axes.set_xlabel(PRESSURE_LABEL)
+        axes.set_xlabel(label_of("reduced_pressure"))
     legend_below(fig, named_handles([areas]) | points_handles([len(error_sources)]))
     return fig
 

@@ -11,32 +11,14 @@ import xarray as xr
 from icha.analysis.control_variates import PROBABILITY
 from icha.analysis.estimates import LOOP
 from icha.datasets import table
-from icha.path.targets import OF_SQUARES, PER_NOMINAL_AREA, UNITS
-from icha.support.formatting import choose_unit, format_quantity
+from icha.datasets.quantities import quantity, state_words
+from icha.path.targets import OF_SQUARES, PER_NOMINAL_AREA
 
-# Words for quantities and for targets.
-WORDS = {
-    "contact_area_fraction": "contact area",
-    "mean_gap": "mean gap",
-    "contact_stiffness": "stiffness",
-    "spot_count": "number of contact patches",
-    "nominal_pressure": "pressure",
-    "pull_off_pressure": "pull-off tension",
-    "hysteresis_loss": "loss of a loop",
-    "contact_radius": "contact radius",
-    "stiffness": "stiffness",
-    "force": "force",
-    "pull_off_force": "pull-off force",
-    "loss_over_contact": "loss divided by contact area and surface energy",
-    "work_of_adhesion_approach": "work of adhesion on approach",
-    "work_of_adhesion_retraction": "work of adhesion on retraction",
-}
 _LEVELS = {
     "asperity_seeds": "the asperity model",
     "coarse_seeds": "boundary elements on half the grid",
     "fine_seeds": "boundary elements",
 }
-_STOPS = {"reduced_pressure": "p*", "relative_load": "p/E*", "area_fraction": "A/A0"}
 # Largest ratio of half-width and absolute value of an interval that is printed with ±. Wider intervals need not be
 # symmetric, so their ends are printed.
 _WIDE = 0.3
@@ -112,8 +94,8 @@ def answers_of(study: xr.Dataset) -> list[Answer]:
 
 
 def _answer(row: xr.Dataset) -> Answer:
-    quantity, value = str(row["quantity"].item()), float(row["estimate"])
-    factor, unit = unit_words(quantity, 0.0 if math.isnan(value) else value, str(row["units"].item()))
+    described, value = quantity(str(row["quantity"].item())), float(row["estimate"])
+    factor, unit = described.in_unit(0.0 if math.isnan(value) else value)
     shares = {name: float(row[f"share_{name}"]) for name in ("seeds", "model", "refinement", "grid", "inputs")}
     known = {name: 0.0 if math.isnan(share) else share for name, share in shares.items()}
     causes = {"seeds": math.hypot(known["seeds"], known["refinement"])}
@@ -131,7 +113,7 @@ def _answer(row: xr.Dataset) -> Answer:
     return Answer(
         f"{row['material'].item()} on {row['surface'].item()}, h'rms = {float(row['rms_slope']):.4g}",
         "" if kind == LOOP else state_words(kind, float(row["stop_target"])),
-        WORDS[quantity],
+        described.name,
         value * factor,
         float(row["estimate_low"]) * factor,
         float(row["estimate_high"]) * factor,
@@ -140,22 +122,6 @@ def _answer(row: xr.Dataset) -> Answer:
         "".join(f"; {note}" for note in notes if note),
         _limit(row, shares),
     )
-
-
-def unit_words(quantity: str, value: float, unit: str) -> tuple[float, str]:
-    """Return a factor and a unit in which a value has few digits."""
-    if quantity == "contact_area_fraction":
-        return 100.0, "%"
-    if unit == "1":
-        return 1.0, ""
-    return choose_unit(value, unit)
-
-
-def state_words(kind: str, target: float) -> str:
-    """Return the target of a state as text, such as `p* = 0.01` or `pressure 10 kPa`."""
-    unit = UNITS.get(kind, "")
-    words = kind.replace("_", " ")
-    return f"{words} {format_quantity(target, unit)}" if unit else f"{_STOPS[kind]} = {target:g}"
 
 
 def _limit(row, shares):

@@ -5,8 +5,8 @@ import math
 
 import xarray as xr
 
-from icha.analysis.answers import WORDS, state_words, unit_words
 from icha.contact.models import MODELS
+from icha.datasets.quantities import quantity, state_words
 from icha.support.distributions import KINDS
 from icha.support.formatting import format_quantity
 
@@ -20,8 +20,8 @@ def sample_rows(data: xr.Dataset) -> list[dict]:
     rows = []
     for k in range(data.sizes.get("response", 0)):
         row = data.isel(response=k)
-        quantity, number = str(row["response_quantity"].item()), int(row["response_target"])
-        factor, unit = unit_words(quantity, float(row["middle"]), data[quantity].attrs["units"])
+        described, number = quantity(str(row["response_quantity"].item())), int(row["response_target"])
+        factor, unit = described.in_unit(float(row["middle"]))
         state = f" at {state_words(*(data[key].values[number] for key in ('stop_kind', 'stop_target')))}"
         model = f", {MODELS[str(row['response_model'].item())].words}" if data.sizes["model"] > 1 else ""
         low, middle, high = (f"{float(f'{float(row[name]) * factor:.3g}'):g}" for name in ("low", "middle", "high"))
@@ -37,7 +37,7 @@ def sample_rows(data: xr.Dataset) -> list[dict]:
         error = float(row["unexplained"])
         rows.append(
             {
-                "result": f"{WORDS[quantity]}{state if number >= 0 else ''}{model}",
+                "result": f"{described.name}{state if number >= 0 else ''}{model}",
                 "cases": str(int(row["case_count"])),
                 "middle": f"{middle} {unit}".strip() + biased,
                 "range": "not stated" if low == "nan" else f"{low} to {high} {unit}".strip() + biased,
@@ -78,7 +78,7 @@ def sample_table(data: xr.Dataset) -> str:
 
 
 def left_out_lines(rows: list[dict]) -> list[str]:
-    """Return a line for each group of results that leave out the same cases, such as `pull-off tension: 9 of 16 …`."""
+    """Return a line for each group of results that leave out the same cases, such as `pull-off pressure: 9 of 16 …`."""
     groups: dict[str, list[str]] = {}
     for row in rows:
         groups.setdefault(row["left_out"], []).append(row["result"])

@@ -157,12 +157,12 @@ def print_plan(path: Path, campaign, home: Path, cores: int, *, runs=False, loca
 
 def _accuracy(name: str, study) -> str:
     """Return a sentence on the seeds of a study with `accuracy`: the pilot, or the seeds that ICHA has chosen."""
-    from icha.analysis.answers import WORDS
     from icha.configuration.studies import PILOT
+    from icha.datasets.quantities import quantity
     from icha.planning.levels import quantity_of, words_of_levels
 
     levels = study.seeds_of_levels
-    wanted = f"± {100 * study.accuracy.half_width:.3g} % of the {WORDS[quantity_of(study.accuracy, study)]}"
+    wanted = f"± {100 * study.accuracy.half_width:.3g} % of the {quantity(quantity_of(study.accuracy, study)).name}"
     counts = {key: len(seeds) for key in type(levels).model_fields if (seeds := getattr(levels, key))}
     pilot = "a pilot of " if levels == PILOT else ""
     return f"study {name}, {wanted}: {pilot}{words_of_levels(counts)}"

@@ -9,6 +9,7 @@ import numpy as np
 
 from icha.contact.models import MODELS, REFERENCE_MODEL
 from icha.datasets.labels import slopes_of
+from icha.datasets.quantities import label_of
 from icha.figures import select
 from icha.figures.ensembles import draw_members, lines_handles, mark_fewer
 from icha.figures.looks import (
@@ -34,18 +35,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-PRESSURE_LABEL = r"reduced pressure  $F/(E^{\ast}h′_{\mathrm{rms}}A_0)$"
-AREA_LABEL = r"contact area  $A/A_0$"
-RATIO_LABEL = r"contact area over load  $AE^{\ast}h′_{\mathrm{rms}}/F$"
-SEPARATION_LABEL = r"mean separation  $\bar{u}/h_{\mathrm{rms}}$"
-GAP_LABEL = r"mean gap  $\langle u\rangle/h_{\mathrm{rms}}$"
-
 _UNLOADING = {"ls": BRANCH_DASHES["unloading"], "lw": 0.7, "zorder": 2.2}
 
 
 def gap_label(data: xr.Dataset) -> str:
     """Return the axis label "mean gap", or the label "mean separation" if all surfaces are periodic."""
-    return GAP_LABEL if (data["boundary"] == "free").any() else SEPARATION_LABEL
+    return label_of("reduced_gap" if (data["boundary"] == "free").any() else "reduced_separation")
 
 
 class Curve(NamedTuple):
@@ -216,8 +211,7 @@ def physical_units(dataset: xr.Dataset, gap_name: str = "mean_gap") -> tuple[Axi
         choose_unit(float(np.abs(dataset[name]).max()), unit)
         for name, unit in (("nominal_pressure", "Pa"), (gap_name, "m"))
     )
-    words = gap_name.replace("_", " ")
-    return Axis(f"pressure  $p$ ({pressure_unit})", pressure), Axis(f"{words} ({gap_unit})", gap)
+    return Axis(label_of("nominal_pressure", pressure_unit), pressure), Axis(label_of(gap_name, gap_unit), gap)
 
 
 def physical_points(name: str, pressure: Axis, factor: float = 1.0) -> Points:

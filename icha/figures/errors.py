@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.figures.curves import PRESSURE_LABEL
+from icha.datasets.quantities import label_of
 from icha.figures.ensembles import draw_points, points_handles
 from icha.figures.looks import Contact, Looks, legend_below
 from icha.figures.select import NothingToDraw, compared_seeds, select_errors
@@ -29,7 +29,7 @@ _MARGIN, _LEAST_REACH = 1.2, 1.6
 
 @in_style
 def draw_errors(
-    campaign: xr.DataTree, model_error: xr.DataTree, *, study: str, labels: Mapping[str, str], percent: bool
+    campaign: xr.DataTree, model_error: xr.DataTree, *, study: str, names: Sequence[str], percent: bool
 ) -> Figure:
     """Draw variables of the model error against load, with one panel for each variable.
 
@@ -38,26 +38,26 @@ def draw_errors(
     campaign : the campaign dataset; the order of the materials in the dataset determines the colours.
     model_error : the errors of the campaign, from `icha.analysis.model_error.model_error`.
     study : name of the study; the figure shows all errors of this study.
-    labels : axis label of each variable, by name of the variable.
+    names : the variables, one for each column of panels.
     percent : True for relative errors, which are drawn in per cent; False for variables that are never negative.
     """
-    curves = _curves(model_error, study, list(labels))
+    curves = _curves(model_error, study, names)
     contacts = [contact for contact, _ in curves]
     own_rows = len({tuple(place) for _, *place in contacts}) > _MOST_LINES
     interfaces = campaign[study].to_dataset()
     looks = Looks(campaign, interfaces, contacts, by_place=own_rows)
     rows = [[material] for material in looks.materials] if own_rows else [looks.materials]
-    fig, panels = new_panels(0.55 + 2.35 * len(rows), len(rows), len(labels), sharex=True, sharey="col")
+    fig, panels = new_panels(0.55 + 2.35 * len(rows), len(rows), len(names), sharex=True, sharey="col")
     named: dict[str, object] = {}
     counts: set[int] = set()
     for row, shown in zip(panels, rows, strict=True):
         drawn = [(*of, errors) for of, errors in curves.items() if of[0][0] in shown]
         if own_rows and not looks.adhesive(shown[0]):
-            drawn = _different(drawn, list(labels))
+            drawn = _different(drawn, names)
         for position, (contact, applicable, errors) in enumerate(drawn):
             look = looks.look(contact, applicable=applicable)
             loads = errors["reduced_pressure"].values * _APART ** (position - (len(drawn) - 1) / 2)
-            for ax, name in zip(row, labels, strict=True):
+            for ax, name in zip(row, names, strict=True):
                 members = (100 if percent else 1) * errors[name].values
                 asked = compared_seeds(errors)
                 handle = draw_points(ax, loads, members, look, positive=not percent, asked=asked)
@@ -68,12 +68,12 @@ def draw_errors(
             ax.set_title(material_label(interfaces, shown[0]), loc="right", fontsize=8)
     low, high = panels[0, 0].dataLim.intervalx
     middle, reach = np.sqrt(low * high), max(_MARGIN * np.sqrt(high / low), _LEAST_REACH)
-    for ax, label in zip(panels.ravel(), itertools.cycle(labels.values()), strict=False):
+    for ax, name in zip(panels.ravel(), itertools.cycle(names), strict=False):
         logarithmic_axes(ax, "x")
-        ax.set(xlim=(middle / reach, middle * reach), ylabel=label)
+        ax.set(xlim=(middle / reach, middle * reach), ylabel=label_of(name, "%" if percent else ""))
         ax.axhline(0, color="0.6", lw=0.7, zorder=0)
     for ax in panels[-1]:
-        ax.set(xlabel=PRESSURE_LABEL, ylim=(None if percent else 0, None))
+        ax.set(xlabel=label_of("reduced_pressure"), ylim=(None if percent else 0, None))
     named.pop("", None)
     named = looks.colour_handles() if own_rows else looks.handles() if looks.many else named
     legend_below(fig, named | points_handles(counts), rows=looks.slopes_per_surface)

@@ -13,6 +13,4 @@ DECLARATION = Declaration(
     inputs=dataset_and_model_error,
 )
 
-LABELS = {"area_error": r"$A/A_{\mathrm{BEM}}-1$  (%)", "separation_error": r"$\bar{u}/\bar{u}_{\mathrm{BEM}}-1$  (%)"}
-
-figure = partial(draw_errors, labels=LABELS, percent=True)
+figure = partial(draw_errors, names=("area_error", "separation_error"), percent=True)

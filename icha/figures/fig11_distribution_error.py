@@ -13,10 +13,6 @@ DECLARATION = Declaration(
     inputs=dataset_and_model_error,
 )
 
-LABELS = {
-    "pressure_distribution_distance": r"distance of $P(p)$,  $W_1/p$",
-    "gap_distribution_distance": r"distance of $P(u)$,  $W_1/h_{\mathrm{rms}}$",
-    "jaccard": "overlap of the contact maps",
-}
+NAMES = ("pressure_distribution_distance", "gap_distribution_distance", "jaccard")
 
-figure = partial(draw_errors, labels=LABELS, percent=False)
+figure = partial(draw_errors, names=NAMES, percent=False)

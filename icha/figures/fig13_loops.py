@@ -8,8 +8,9 @@ import numpy as np
 
 from icha.contact.model import EVENT_KINDS
 from icha.contact.models import MODELS, REFERENCE_MODEL
+from icha.datasets.quantities import label_of
 from icha.figures import select
-from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, SEPARATION_LABEL, Axis, physical_units
+from icha.figures.curves import Axis, physical_units
 from icha.figures.declaration import (
     Declaration,
     TopographyFigure,
@@ -110,7 +111,7 @@ def figure(
     # Slopes that have their own panels need no markers.
     contacts = [(labels.material, labels.surface, None if own_rows else labels.rms_slope) for labels, _ in runs]
     looks = looks_of_studies(campaign, [study], contacts)
-    pressure, gap = Axis(PRESSURE_LABEL, 1.0), Axis(SEPARATION_LABEL, 1.0)
+    pressure, gap = (Axis(label_of(name), 1.0) for name in ("reduced_pressure", "reduced_separation"))
     if units == "physical":
         pressure, gap = physical_units(campaign[study].to_dataset(), "mean_separation")
     drawn = []
@@ -144,7 +145,7 @@ def figure(
             times = rf"$10^{{{-exponent}}}\times$ " if exponent else ""
             ax.set_ylabel(times + pressure.label.partition("  ")[2])
         left.set_ylabel(pressure.label)
-        right.set_ylabel(AREA_LABEL)
+        right.set_ylabel(label_of("contact_area_fraction"))
         if own_rows:
             right.set_title(slope_label(shown_loops[0].rms_slope), loc="right")
     for ax in panels[-1, :-1]:

@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from icha.contact.models import REFERENCE_MODEL
+from icha.datasets.quantities import label_of
 from icha.figures.curves import cross_look, drop_rounding_errors
 from icha.figures.declaration import Campaign, Declaration, StudyFigure, problems_of_unloading
 from icha.figures.ensembles import Points, points_handles
@@ -97,16 +98,16 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
             counts += line.counts
         loads, values = np.concatenate([line.means for line in lines.values()], axis=1)
         _scale(ax, values)
-        ax.set_ylabel(f"pull-off pressure ({unit})")
+        ax.set_ylabel(label_of(_Y, unit))
     slopes = sorted({point.labels.rms_slope for line in by_slope.values() for point in line})
     scale = "log" if slopes[-1] > 3 * slopes[0] > 0 else "linear"
-    panels[0].set(xlabel=r"rms slope  $h′_{\mathrm{rms}}$", xscale=scale)
+    panels[0].set(xlabel=label_of("rms_slope"), xscale=scale)
     room = 0.25 * (slopes[-1] or 1)  # a smooth shape has the slope 0
     panels[0].set_xlim(slopes[0] / 1.25 if slopes[0] else -room, slopes[-1] + room)
     panels[0].set_xticks(slopes, [f"{slope:.4g}" for slope in slopes])
     panels[0].xaxis.minorticks_off()
     if by_load:
-        panels[1].set_xlabel(r"largest reduced pressure  $F/(E^{\ast}h′_{\mathrm{rms}}A_0)$")
+        panels[1].set_xlabel(label_of("largest_reduced_pressure"))
         if loads.min() > 0:
             logarithmic_axes(panels[1], "x")
             panels[1].set_xlim(loads.min() / 1.6, loads.max() * 1.6)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.contact.models import REFERENCE_MODEL
+from icha.datasets.quantities import LOSS_PARTS, label_of
 from icha.figures.curves import cross_look
 from icha.figures.declaration import Campaign, Declaration, FigureOptions, problems_of_unloading
 from icha.figures.ensembles import Points, points_handles
@@ -42,14 +43,20 @@ DECLARATION = Declaration(
     options=LossFigure,
 )
 
-# For each part of the loss: name in the legend, and look of the bars. No bar has the colour of a material.
-PARTS = {
-    "loss_by_jump_in": ("jump into contact", {"fc": "0.25"}),
-    "loss_by_jump_off": ("jump off", {"fc": "0.65"}),
-    "loss_by_coalescence": ("unions and their undoing", {"fc": "white", "hatch": "//////"}),
-    "loss_by_load_jump": ("jumps at controlled load", {"fc": "0.85", "hatch": "xxxx"}),
-    "loss_unattributed": ("unattributed", {"fc": "white", "hatch": "...."}),
-}
+# Look of the bar of each part of the loss. No bar has the colour of a material.
+PARTS = dict(
+    zip(
+        LOSS_PARTS,
+        (
+            {"fc": "0.25"},
+            {"fc": "0.65"},
+            {"fc": "white", "hatch": "//////"},
+            {"fc": "0.85", "hatch": "xxxx"},
+            {"fc": "white", "hatch": "...."},
+        ),
+        strict=True,
+    )
+)
 # Smallest number of points for a fitted line, because a straight line passes through any two points.
 _LEAST_POINTS = 3
 _FIT_POINTS = 100
@@ -86,7 +93,7 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
     else:
         loss.set_title(", ".join(names_of_models(itertools.chain(*sticky.values()))), loc="right")
     shown = _draw_parts(parts, sticky, looks)
-    handles |= {PARTS[name][0]: Patch(ec="black", lw=0.5, **PARTS[name][1]) for name in shown}
+    handles |= {label_of(name): Patch(ec="black", lw=0.5, **PARTS[name]) for name in shown}
     legend_below(fig, handles | points_handles(counts), looks.heading(), rows=looks.slopes_per_surface)
     return fig
 
@@ -116,7 +123,7 @@ def _draw_losses(ax, runs, truths, looks):
     if all(values.min() > 0 and values.max() > _SPAN * values.min() for values in means):
         logarithmic_axes(ax)
     ax.axhline(0, color=GREY, lw=0.6, zorder=1)
-    ax.set(xlabel=r"contact area at the largest load  $A/A_0$", ylabel=r"hysteresis loss over $\Delta\gamma$")
+    ax.set(xlabel=label_of(_LOSS[0]), ylabel=label_of(_LOSS[1]))
     return handles, [count for line in drawn.values() for count in line.counts]
 
 
@@ -150,7 +157,7 @@ def _draw_parts(ax, runs, looks):
         above, below = 0.0, 0.0
         for name in shown:
             share = 100 * bar[name]
-            bar_look = {"ec": "black", "lw": 0.4, "alpha": None if applicable else _PALE} | PARTS[name][1]
+            bar_look = {"ec": "black", "lw": 0.4, "alpha": None if applicable else _PALE} | PARTS[name]
             ax.bar(position, share, 0.8, bottom=above if share > 0 else below, **bar_look)
             above, below = above + max(share, 0), below + min(share, 0)
         look = looks.look(contact, applicable=applicable, model=model)

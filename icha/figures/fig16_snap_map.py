@@ -11,7 +11,7 @@ from icha.contact.model import EVENT_KINDS
 from icha.contact.models import REFERENCE_MODEL
 from icha.datasets import results
 from icha.datasets.labels import RunLabels
-from icha.figures.curves import SEPARATION_LABEL
+from icha.datasets.quantities import label_of
 from icha.figures.declaration import Campaign, Declaration, Inputs, RunFigure, UnloadedFigure
 from icha.figures.looks import BRANCH_DASHES, COARSE_GRID_ALONE, NOT_APPLICABLE_ALONE, legend_below
 from icha.figures.maps import topography_of
@@ -118,7 +118,7 @@ def _draw_counts(ax, events):
                 ax.plot(steps, counts, color=look["mec"], ls=dashes, lw=width, drawstyle="steps-post")
     ax.set_ylim(bottom=0)
     ax.yaxis.set_major_locator(MaxNLocator(integer=True))
-    ax.set(xlabel=SEPARATION_LABEL, ylabel="events so far")
+    ax.set(xlabel=label_of("reduced_separation"), ylabel="events so far")
 
 
 def _events(run):

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from icha.datasets.quantities import label_of
 from icha.figures import select
 from icha.figures.declaration import Declaration
 from icha.figures.indenter_curves import IndenterFigure, select_series, theory_curves
@@ -62,7 +63,7 @@ def figure(campaign: xr.DataTree, *, study: str) -> Figure:
         ax.axhline(0, color=GREY, lw=0.5, zorder=0)
         if len(shown) > 1:
             ax.set_title(of_panel[0].name, loc="right")
-        ax.set(xlabel=f"indentation ({depth_unit})", ylabel=f"force ({force_unit})")
+        ax.set(xlabel=label_of("indentation", depth_unit), ylabel=label_of("force", force_unit))
         ax.set(xlim=_limits(depth * per_metre), ylim=_limits(force * per_newton))
         ax.label_outer()
     for ax in panels.ravel()[len(shown) :]:

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from icha.datasets.quantities import symbol_of
 from icha.figures.declaration import Declaration
 from icha.figures.looks import legend_below
-from icha.figures.samples import SampleFigure, responses, sample_inputs, symbol, title_of
+from icha.figures.samples import SampleFigure, responses, sample_inputs, title_of
 from icha.figures.select import NothingToDraw
 from icha.figures.style import BLUE, GREY, TWO_COLUMNS, in_style, new_panels
 
@@ -57,7 +58,7 @@ def figure(sensitivity: xr.DataTree, *, study: str, target: int = -1) -> Figure:
             ends = np.clip([values - widths, values + widths], 0, 100)
             ax.errorbar(values, places + offset, xerr=abs(ends - values), **_CAP)
         ax.set_title(title_of(data, row), loc="right", fontsize=8)
-        ax.set(xlim=(0, 105), xlabel="share of variance (%)", yticks=places, yticklabels=[symbol(n) for n in names])
+        ax.set(xlim=(0, 105), xlabel="share of variance (%)", yticks=places, yticklabels=[symbol_of(n) for n in names])
         ax.tick_params(axis="y", length=0)
         if k + columns < count:
             ax.set_xlabel("")

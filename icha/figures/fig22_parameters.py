@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from pydantic import Field
 
+from icha.datasets import quantities
 from icha.figures.declaration import Campaign, Declaration
 from icha.figures.looks import legend_below
 from icha.figures.samples import SampleFigure, best_model, responses, sample_inputs, scale_of, title_of
@@ -49,19 +50,18 @@ def figure(
     sensitivity: xr.DataTree, *, study: str, target: int = -1, quantity: str = "contact_area_fraction"
 ) -> Figure:
     """Draw one panel for each parameter: a point for each case, and the mean over the other parameters as a line."""
-    from icha.analysis.answers import WORDS, unit_words
     from icha.figures.select import NothingToDraw
 
-    data = sensitivity[study].to_dataset()
+    data, described = sensitivity[study].to_dataset(), quantities.quantity(quantity)
     shown = responses(data, target)
     shown = shown.isel(response=(shown["response_quantity"] == quantity).values)
     if not shown.sizes["response"]:
-        raise NothingToDraw(f"study {study}: no case has a result for {WORDS[quantity]}")
+        raise NothingToDraw(f"study {study}: no case has a result for {described.name}")
     row = shown.isel(response=0)
     number = int(row["response_target"])
     values = data[quantity].sel(model=best_model(data["model"].values.tolist()))
     values = np.exp(np.log((values if number < 0 else values.isel(target=number)).where(lambda v: v > 0)).mean("seed"))
-    factor, unit = unit_words(quantity, float(row["middle"]), data[quantity].attrs["units"])
+    factor, unit = described.in_unit(float(row["middle"]))
     results = values.values * factor
     names = data["parameter"].values.tolist()
     columns = min(len(names), _COLUMNS)
@@ -78,7 +78,7 @@ def figure(
             ax.plot(data["effect_value"].values[k] * scale, row["main_effect"].values[k] * factor, color=VERMILLION)
         ax.set_xlabel(label)
         if k % columns == 0:
-            ax.set_ylabel(f"{WORDS[quantity]} ({unit})" if unit else WORDS[quantity])
+            ax.set_ylabel(described.label(unit))
     if np.nanmax(results) > _DECADE * np.nanmin(results):
         logarithmic_axes(panels[0, 0], "y")
     words = title_of(data, row)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from icha.datasets.quantities import label_of, quantity
 from icha.figures import curves
 from icha.figures.declaration import Declaration, StudyFigure, UnitsFigure, dataset_and_theories
 from icha.figures.ensembles import draw_members
@@ -34,8 +35,8 @@ _SAME_LOAD = 1e-6
 _SEPARATIONS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5)
 # Look of Ciavarella's estimate from boundary elements without adhesion.
 _ESTIMATE = {"ls": (0, (6, 1.5, 1, 1.5, 1, 1.5)), "lw": 0.9, "zorder": 1.9}
-# Each entry has two parts: the function that returns the points of a run, and the symbol of the quantity.
-_QUANTITIES = ((curves.area_points, "A"), (curves.gap_points, r"\bar{u}"))
+# For each lower panel, the function that returns the points of a run, and the difference that is drawn.
+_QUANTITIES = ((curves.area_points, "area_error"), (curves.gap_points, "separation_error"))
 
 
 @in_style
@@ -70,14 +71,14 @@ def figure(
     if references is not None:
         _draw_references(left, right, references, x)
         _draw_separate_summits(left, right, references, dataset, shown.looks)
-    left.set_ylabel(curves.RATIO_LABEL)
+    left.set_ylabel(label_of("area_over_load"))
     low, high = gaps.min() / 1.4, gaps.max() * 1.4
     right.set(ylabel=curves.gap_label(dataset), ylim=(low, high))
     right.yaxis.set_major_formatter("{x:g}")
     right.yaxis.set_minor_formatter("")
     if high < 60 * low:
         right.set_yticks([tick for tick in _SEPARATIONS if low < tick < high])
-    for ax, (points, symbol) in zip(axes[1:].ravel(), _QUANTITIES, strict=False):
+    for ax, (points, error) in zip(axes[1:].ravel(), _QUANTITIES, strict=False):
         for line, truth in compared:
             load, members = _difference(line, truth, points)
             if members.size:
@@ -85,11 +86,11 @@ def figure(
                 draw_members(ax, load, members, look, positive=False, asked=asked, curves=len(compared))
         logarithmic_axes(ax, "x")
         ax.axhline(0, color="0.6", lw=0.6, zorder=0)
-        ax.set_ylabel(rf"${symbol}/{symbol}_{{\mathrm{{BEM}}}}-1$  (%)")
+        ax.set_ylabel(rf"${quantity(error).symbol}$  (%)")
     if compared:
         _draw_estimates(axes[1], shown, compared)
     for ax in axes[-1]:
-        ax.set(xlim=x, xlabel=curves.PRESSURE_LABEL)
+        ax.set(xlim=x, xlabel=label_of("reduced_pressure"))
     curves.add_legend(fig, [left, right, *axes[1:].ravel()], shown)
     return fig
 
@@ -121,7 +122,7 @@ def _in_physical_units(campaign, study, references):
             right.plot(p[inside], separation, label="Yang & Persson", **look | {"ls": (0, (7, 2))})
     for ax in (left, right):
         ax.set_xlabel(pressure.label)
-    left.set_ylabel(curves.AREA_LABEL)
+    left.set_ylabel(label_of("contact_area_fraction"))
     right.set_ylabel(gap.label)
     curves.add_legend(fig, [left, right], shown)
     return fig

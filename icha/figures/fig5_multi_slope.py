@@ -9,10 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from icha.datasets import results
+from icha.datasets.quantities import label_of
 from icha.figures.curves import (
-    AREA_LABEL,
-    PRESSURE_LABEL,
-    RATIO_LABEL,
     add_legend,
     draw_curves,
     limit_ratios,
@@ -119,12 +117,12 @@ def figure(
             words = [surface_label(campaign, surface)] if surface else []
             words += [looks.material_name(materials[0])] if own_rows else []
             ax.set_title(", ".join(words), loc="right", fontsize=8)
-            ax.set_ylabel(_LABELS[points][1])
+            ax.set_ylabel(label_of(_DRAWN[points][1]))
             ratios += [values] if points is ratio else []
         for ax in row[[points is ratio for points, _ in columns]]:
             limit_ratios(ax, np.concatenate(ratios))
     for ax, (points, _) in zip(panels[-1], columns, strict=True):
-        ax.set_xlabel(_LABELS[points][0])
+        ax.set_xlabel(label_of(_DRAWN[points][0]))
     add_legend(fig, panels.ravel(), curves)
     return fig
 
@@ -169,10 +167,9 @@ def _ratio_at_load(run):
     return pressure * float(run["unit_slope"]), ratio / float(run["unit_slope"])
 
 
-_LOAD_LABEL = r"relative load  $F/(E^{\ast}A_0)$"
-# Labels of the load and of the values, by the function that returns the points of a run.
-_LABELS = {
-    ratio_points: (PRESSURE_LABEL, RATIO_LABEL),
-    _area_at_load: (_LOAD_LABEL, AREA_LABEL),
-    _ratio_at_load: (_LOAD_LABEL, r"contact area over load  $AE^{\ast}/F$"),
+# Load and drawn quantity, by the function that returns the points of a run.
+_DRAWN = {
+    ratio_points: ("reduced_pressure", "area_over_load"),
+    _area_at_load: ("relative_load", "contact_area_fraction"),
+    _ratio_at_load: ("relative_load", "area_over_relative_load"),
 }

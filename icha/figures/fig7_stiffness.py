@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.figures.curves import PRESSURE_LABEL, add_legend, draw_curves, drop_rounding_errors, study_curves
+from icha.datasets.quantities import label_of
+from icha.figures.curves import add_legend, draw_curves, drop_rounding_errors, study_curves
 from icha.figures.declaration import Declaration, StudyFigure, dataset_and_theories
 from icha.figures.select import NothingToDraw
 from icha.figures.style import BLACK, in_style, new_panels
@@ -40,10 +41,10 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
         left.plot(p[shown], theory[shown], **look)
         right.plot(p[shown], theory[shown] / p[shown], **look)
         ratio = np.concatenate([ratio, theory[shown] / p[shown]])
-    stiffness_label = r"contact stiffness  $K h_{\mathrm{rms}}/(E^{\ast}h′_{\mathrm{rms}})$"
     y = (drop_rounding_errors(stiffnesses).min() / 2, stiffnesses.max() * 2)
-    left.set(xlim=x, xlabel=PRESSURE_LABEL, ylim=y, ylabel=stiffness_label)
-    right.set(xlim=x, xlabel=PRESSURE_LABEL, ylim=(0, 1.15 * ratio.max()), ylabel=r"$K h_{\mathrm{rms}}/p$")
+    label = label_of("reduced_pressure")
+    left.set(xlim=x, xlabel=label, ylim=y, ylabel=label_of("reduced_stiffness"))
+    right.set(xlim=x, xlabel=label, ylim=(0, 1.15 * ratio.max()), ylabel=label_of("stiffness_over_pressure"))
     add_legend(fig, [left, right], curves)
     return fig
 

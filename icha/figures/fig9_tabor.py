@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.contact.attraction import FINITE_RANGE, SHORT_RANGE
-from icha.figures.curves import AREA_LABEL, gap_label
+from icha.datasets.quantities import label_of
+from icha.figures.curves import gap_label
 from icha.figures.declaration import Declaration, SnapshotFigure
 from icha.figures.ensembles import Points, points_handles
 from icha.figures.looks import Looks, legend_below, named_handles
@@ -80,7 +81,7 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
         for ax, name in zip(panels, _STATE, strict=True):
             mean = np.mean([float(state[name]) for group in line for state in group.by_seed.values()])
             ax.axhline(mean, ls=(0, (5, 2)), lw=1, zorder=1, **look)
-    for ax, label in zip(panels, (AREA_LABEL, gap_label(dataset)), strict=True):
+    for ax, label in zip(panels, (label_of("contact_area_fraction"), gap_label(dataset)), strict=True):
         if max(drawn) > _SPAN * min(drawn):
             logarithmic_axes(ax, "x")
         _finish(ax, min(drawn))
@@ -104,7 +105,7 @@ def _pull_off_of_spheres(runs):
             if chosen.any():
                 ax.plot(tabor[chosen], values[chosen], "o", ms=4.5, mec="C0", mfc=fill, label=label)
         logarithmic_axes(ax, "x")
-        ax.set_xlabel(r"Tabor parameter  $\mu$")
+        ax.set_xlabel(label_of("tabor_parameter"))
     at = np.geomspace(tabor.min(), tabor.max(), 200)
     panels[0].plot(at, [sphere_pull_off_factor(each) for each in at], color="0.3", lw=1, label="theory of Maugis")
     for limit, name, style in ((1.5, "JKR", (0, (5, 2))), (2.0, "DMT", ":")):
@@ -132,7 +133,7 @@ def _finish(ax, smallest):
     if smallest < WU_HOLDS_FROM / 1.01:
         ax.axvspan(low, WU_HOLDS_FROM, color="0.93", lw=0, zorder=0, label="jump-in distance not verified")
     ax.set_xlim(low, high)
-    ax.set_xlabel(r"Tabor parameter  $\mu$")
+    ax.set_xlabel(label_of("tabor_parameter"))
     # The limits of the axis are wider than the values, so that differences of a few per mille do not fill the panel.
     bottom, top = ax.get_ylim()
     ax.set_ylim(0.95 * bottom, 1.05 * top)

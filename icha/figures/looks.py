@@ -16,6 +16,7 @@ import numpy as np
 
 from icha.contact.models import DEFAULT_MODEL, MODELS, REFERENCE_MODEL
 from icha.datasets.labels import RunLabels, slopes_of
+from icha.datasets.quantities import symbol_of
 from icha.figures.select import FINITE_RANGE_NAME
 from icha.figures.style import BLACK, COLOURS, GREY, INTERFACE, legend_handle, material_label, slope_label
 from icha.support.formatting import format_quantity
@@ -221,17 +222,6 @@ class Looks:
         return ", ".join(filter(None, [self.material_name(material), place]))
 
 
-# Symbols of varied parameters of surfaces.
-_SYMBOLS = {
-    "hurst": "$H$",
-    "rolloff_wavelength": r"$\lambda_{\mathrm{r}}$",
-    "short_wavelength": r"$\lambda_{\mathrm{s}}$",
-    "period": "$L$",
-    "grid": "$n$",
-    "cutoff": r"$\lambda_{\mathrm{c}}$",
-}
-
-
 def surface_label(campaign: xr.DataTree, surface: str) -> str:
     """Return the name of a surface; if parameters are varied, the name of the original surface and the parameters."""
     for study in campaign.children.values():
@@ -262,7 +252,7 @@ def _symbol_and_value(name, values, k):
         shown = value
     else:
         shown = format_quantity(value, "m") if values.attrs["units"] == "m" else f"{value:g}"
-    return f"{_SYMBOLS.get(name, name.replace('_', ' '))} = {shown}"
+    return f"{symbol_of(name)} = {shown}"
 
 
 def looks_of_studies(

@@ -10,22 +10,13 @@ from pydantic import Field
 
 from icha.contact.models import MODELS
 from icha.datasets import results
+from icha.datasets.quantities import quantity, state_words, symbol_of
 from icha.figures.declaration import Campaign, Inputs, StudyFigure
 from icha.support.formatting import choose_unit
 from icha.support.values import Problem
 
 if TYPE_CHECKING:
     import xarray as xr
-
-# Symbols of parameters; other parameters are written as words.
-_SYMBOLS = {
-    "hurst": "$H$",
-    "contact_modulus": r"$E^{\ast}$",
-    "surface_energy": r"$\Delta\gamma$",
-    "rms_slope": r"$h′_{\mathrm{rms}}$",
-    "rolloff_wavelength": r"$\lambda_r$",
-    "short_wavelength": r"$\lambda_s$",
-}
 
 
 class SampleFigure(StudyFigure):
@@ -74,25 +65,18 @@ def best_model(models: Sequence[str]) -> str:
 
 def title_of(data: xr.Dataset, row: xr.Dataset) -> str:
     """Return quantity and state of a result, such as `contact area at p* = 0.01`."""
-    from icha.analysis.answers import WORDS, state_words
-
     number = int(row["response_target"])
-    words = WORDS[str(row["response_quantity"].item())]
+    words = quantity(str(row["response_quantity"].item())).name
     if number < 0:
         return words
     kind, target = str(data["stop_kind"].values[number]), float(data["stop_target"].values[number])
     return f"{words} at {state_words(kind, target)}"
 
 
-def symbol(name: str) -> str:
-    """Return the symbol of a parameter, or its name in words."""
-    return _SYMBOLS.get(name, name.replace("_", " "))
-
-
 def scale_of(data: xr.Dataset, name: str) -> tuple[float, str]:
     """Return factor and label of the axis of a parameter."""
     unit = data[name].attrs["units"]
     if unit == "1":
-        return 1.0, symbol(name)
+        return 1.0, symbol_of(name)
     factor, prefixed = choose_unit(float(np.abs(data[name].values).max()), unit)
-    return factor, f"{symbol(name)} ({prefixed})"
+    return factor, f"{symbol_of(name)} ({prefixed})"

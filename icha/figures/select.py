@@ -11,8 +11,10 @@ import numpy as np
 from icha.contact.attraction import FINITE_RANGE
 from icha.contact.models import MODELS, REFERENCE_MODEL, first_model, model_of
 from icha.datasets.labels import LABELS, RunLabels, place_of, surfaces_and_slopes
+from icha.datasets.quantities import quantity
 from icha.figures.style import format_number
-from icha.path.targets import UNLOADING
+from icha.path.targets import UNITS, UNLOADING
+from icha.support.formatting import format_quantity
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -254,25 +256,15 @@ def select_snapshots(
     return found
 
 
-_KIND_LABELS = {
-    "reduced_pressure": r"$F/(E^{\ast}h′_{\mathrm{rms}}A_0)$",
-    "relative_load": r"$F/(E^{\ast}A_0)$",
-    "area_fraction": r"$A/A_0$",
-    "mean_separation": r"$\bar{u}$ (m)",
-    "pressure": r"$p$ (Pa)",
-    "force": r"$F$ (N)",
-    "indentation": r"$-\bar{u}$ (m)",
-    "contact_radius": r"$\sqrt{A/\pi}$ (m)",
-}
-
-
 def snapshot_label(run: xr.Dataset, snapshot: int) -> str:
     """Return the target of a snapshot as text, such as an area fraction with its value."""
     kind, value = str(run["snapshot_kind"].values[snapshot]), float(run["snapshot_target"].values[snapshot])
     if kind == "pull_off":
         return "pull-off"
     branch = "unloading, " if kind.startswith(UNLOADING) else ""
-    return f"{branch}{_KIND_LABELS[kind.removeprefix(UNLOADING)]} = {format_number(value)}"
+    kind = kind.removeprefix(UNLOADING)
+    shown = format_quantity(value, UNITS[kind]) if kind in UNITS else format_number(value)
+    return f"{branch}${quantity(kind).symbol}$ = {shown}"
 
 
 def select_errors(model_error: xr.DataTree, study: str) -> Iterator[tuple[tuple[str, str, float], xr.Dataset]]:

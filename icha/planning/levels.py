@@ -15,13 +15,13 @@ import xarray as xr
 import yaml
 
 from icha.analysis.allocation import LEVELS, allocate, half_width_of_seeds, nest, variances_per_seed
-from icha.analysis.answers import WORDS
 from icha.analysis.estimates import estimate_campaign
 from icha.configuration.campaign import Campaign
 from icha.configuration.studies import Accuracy, Study
 from icha.contact.models import DEFAULT_MODEL
 from icha.datasets.files import read_campaign
 from icha.datasets.labels import coarse_study
+from icha.datasets.quantities import quantity
 from icha.datasets.results import CHOSEN_LEVELS
 from icha.path.targets import AREAS
 from icha.planning.plan import RUNS, plan
@@ -61,7 +61,7 @@ class Choice(NamedTuple):
         """The accuracy that was reached, beside the required one, and the runs that are left out."""
         reached = f"± {100 * self.half_width:.2g} %" if math.isfinite(self.half_width) else "no interval"
         left_out = f"; {self.left_out}" if self.left_out else ""
-        return f"{WORDS[self.quantity]} {reached} ({100 * self.required:.3g} % required){left_out}"
+        return f"{quantity(self.quantity).name} {reached} ({100 * self.required:.3g} % required){left_out}"
 
 
 def choose_levels(campaign: Campaign, results: Path, cores: int) -> dict[str, Choice]:

@@ -98,7 +98,7 @@ def test_coarsest_loops_are_named_first():
 def test_estimates_of_loops_say_that_the_error_of_the_grid_is_not_known():
     tree = estimate_campaign(loops(0.7))
     rows = [each for each in answers_of(tree["pull"].to_dataset()) if not each.state]
-    assert {each.quantity for each in rows} == {"pull-off tension", "loss of a loop"}
+    assert {each.quantity for each in rows} == {"pull-off pressure", "hysteresis loss"}
     for each in rows:
         assert "; on this grid, whose error is not known; with 0.7 cells" in each.number
         assert any(each.quantity in line and "whose error is not known" in line for line in as_latex(tree))

@@ -123,8 +123,8 @@ def test_a_failed_check_of_the_loss_leaves_pull_off_and_areas():
     answers, before = (
         {a.quantity: a for a in answers_of(estimate_campaign(t)["pull"].to_dataset())} for t in (tree, whole)
     )
-    assert answers["pull-off tension"].number == before["pull-off tension"].number
-    loss = answers["loss of a loop"]
+    assert answers["pull-off pressure"].number == before["pull-off pressure"].number
+    loss = answers["hysteresis loss"]
     assert loss.note.startswith("; 3 of 5 seeds of boundary elements; 2 failed a check of the loss; biased, so no")
     assert "±" not in loss.number and "from" not in loss.number and np.isnan(loss.low)
     # The run is reported as failed, and its loss is in no table and no figure.

@@ -17,6 +17,7 @@ from icha.analysis.model_error import jaccard
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import read_dataset, write_dataset
 from icha.datasets.labels import RunLabels
+from icha.datasets.quantities import label_of
 from icha.datasets.surface_file import write_surface
 from icha.figures import (
     ensembles,
@@ -781,7 +782,7 @@ def test_captions_name_the_units_and_the_models_that_are_drawn():
 def test_fig2_in_physical_units_has_pressures_and_gaps_with_units():
     references = reference_dataset(small.SPECTRUM, spectral_moments(small.surface()), {})
     left, right = fig2_area_and_gap.figure(small.tree(), references, study="single", units="physical").axes
-    assert left.get_xlabel() == "pressure  $p$ (kPa)" and right.get_ylabel() == "mean gap (µm)"
+    assert left.get_xlabel() == label_of("nominal_pressure", "kPa") and right.get_ylabel() == label_of("mean_gap", "µm")
     load, values = at_common([small.run(seed) for seed in (1, 2)])
     (mean,) = (line for line in right.get_lines() if line.get_marker() == "o" and len(line.get_xdata()) == len(load))
     np.testing.assert_allclose(mean.get_xdata(), load * 1e-3, rtol=1e-6)

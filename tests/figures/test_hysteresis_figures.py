@@ -11,6 +11,7 @@ from matplotlib.colors import to_hex
 from icha.contact.models import REFERENCE_MODEL
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import RunLabels
+from icha.datasets.quantities import label_of
 from icha.figures import fig13_loops, fig14_pull_off, fig15_loss, fig16_snap_map
 from icha.figures.captions import caption_of, texts_of
 from icha.figures.ensembles import Points
@@ -78,7 +79,7 @@ def test_fig13_draws_loading_unloading_and_the_pull_off():
 def test_fig13_in_physical_units_has_separations():
     """On a free square, the mean separation is not the mean gap."""
     left = fig13_loops.figure(one(), study="one", units="physical").axes[0]
-    assert left.get_xlabel().startswith("mean separation (")
+    assert left.get_xlabel().startswith(label_of("mean_separation"))
 
 
 def test_fig13_follows_the_exact_law_between_distant_states():
@@ -364,8 +365,8 @@ def test_fig15_parts_are_of_either_sign_and_make_up_the_whole(tree):
     figure = fig15_loss.figure(one(**parts), studies=["one"])
     heights = sorted((bar.get_y(), bar.get_y() + bar.get_height()) for bar in figure.axes[1].patches)
     np.testing.assert_allclose(heights, [(0, -20), (0, 60), (60, 80)])
-    assert {"jump into contact", "jump off", "unions and their undoing"} <= set(legend(figure))
-    assert not {"unattributed", "jumps at controlled load"} & set(legend(figure))
+    assert {"jump-in", "jump-off", "coalescence"} <= set(legend(figure))
+    assert not {"unattributed", "jumps at constant load"} & set(legend(figure))
 
     # Of the exact loops everything is explained by jumps, at the largest load of every line.
     figure = fig15_loss.figure(tree, studies=list(DEPTHS))

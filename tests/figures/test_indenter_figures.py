@@ -13,6 +13,7 @@ from icha.cli import app
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import write_dataset
 from icha.datasets.labels import RunLabels
+from icha.datasets.quantities import label_of
 from icha.figures import (
     fig2_area_and_gap,
     fig3_distributions,
@@ -58,9 +59,9 @@ def lines(ax):
 
 def test_forces_are_those_of_the_runs_beside_jkr_and_hertz(campaign):
     (ax,) = fig17_force_indentation.figure(campaign, study="press").axes
-    assert ax.get_xlabel() == "indentation (nm)" and ax.get_ylabel().startswith("force (")
+    assert ax.get_xlabel() == label_of("indentation", "nm") and ax.get_ylabel().startswith("force ")
     jkr, hertz = lines(ax)[:2]
-    factor = {"µ": 1e6, "n": 1e9}[ax.get_ylabel()[7]]
+    factor = {"µ": 1e6, "n": 1e9}[ax.get_ylabel().split("(")[1][0]]
     assert jkr[:, 1].min() == pytest.approx(-PULL_OFF * factor, rel=1e-3)
     np.testing.assert_allclose(hertz[:, 1] / factor, 4 / 3 * MODULUS * np.sqrt(RADIUS) * (hertz[:, 0] * 1e-9) ** 1.5)
     smooth = np.concatenate(lines(ax)[2:4])
@@ -110,7 +111,7 @@ def test_each_panel_has_the_theories_of_its_own_runs(lenses):
     figure = fig17_force_indentation.figure(lenses, study="press")
     panels = {ax.get_title("right"): ax for ax in figure.axes}
     assert panels.keys() == {"small, smooth, soft", "small, smooth, dry", "large, smooth, soft"}
-    factor = {"µ": 1e6, "n": 1e9}[figure.axes[0].get_ylabel()[7]]
+    factor = {"µ": 1e6, "n": 1e9}[figure.axes[0].get_ylabel().split("(")[1][0]]
     for title, ax in panels.items():
         lowest, radius = min(line[:, 1].min() for line in lines(ax)), RADIUS * (1 + title.startswith("large"))
         # Without adhesion, no line is below zero.
