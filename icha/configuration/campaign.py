@@ -14,7 +14,8 @@ from typing import Annotated, Any, NamedTuple
 
 from pydantic import AfterValidator, Field, PrivateAttr
 
-from icha.configuration.figures import Figures, Measurement
+from icha.configuration.figures import Figures
+from icha.configuration.measurements import Measurement
 from icha.configuration.publication import Line, Prose, Publication
 from icha.configuration.studies import RmsHeight, Study, is_unread, slope_of_height
 from icha.configuration.surfaces import AnySurface, MaterialSection

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Union, get_args, get_origin
 from pydantic import BaseModel
 
 from icha.configuration.campaign import Campaign
+from icha.configuration.figures import OwnFigure
 from icha.configuration.studies import Study
 from icha.configuration.surfaces import SURFACE_KINDS
-from icha.figures.own_figure import OwnFigure
 from icha.support.formatting import printable
 from icha.support.values import NAME_PATTERN, NOTHING, Problem
 

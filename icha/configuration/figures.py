@@ -1,144 +1,460 @@
-"""Sections `figures` (one key for every figure) and `measurements` (measured contact areas for figure 5)."""
+"""Section `figures`: one key for every figure of ICHA, and figures of the user's own.
 
-import math
-from collections.abc import Iterator
+A request is the section of one figure. It names the input files and the arguments with which `icha.figures.registry`
+draws the figure, so that reading a configuration imports no figure. The docstring of a class and the description of its
+key are in the schema.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
-from pydantic import ConfigDict, Field, create_model, model_validator
+from pydantic import ConfigDict, Field
 
-from icha.asperity.full_contact import gaussian_complete_pressure
-from icha.figures.declaration import FigureOptions
-from icha.figures.own_figure import OwnFigure, caption_in, modules_of
-from icha.figures.registry import DECLARATIONS, figure_number
-from icha.support.formatting import format_quantity
-from icha.support.titles import contradicting_unit, problem_with_numbers
-from icha.support.units import conversion_factor
-from icha.support.values import NOTHING, File, Name, Positive, Problem, Section, Text, unknown
+from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL, first_model
+from icha.datasets import results
+from icha.datasets.labels import RunLabels
+from icha.path.snapshots import Snapshot
+from icha.path.targets import ESTIMATED_AT_TARGETS, ESTIMATED_OF_LOOPS
+from icha.support.scripts import caption_in, modules_of
+from icha.support.values import File, Label, Name, Positive, Problem, Section, Seed, list_names, list_of_names, unknown
 
-# Reduced pressure at which contact without adhesion is complete, for a side of 10^6 shortest wavelengths. Surfaces with
-# fewer wavelengths are in full contact at smaller pressures.
-_FULL_CONTACT = gaussian_complete_pressure(1e6)
-# Smallest plausible unit of nominal pressures, Pa. `mPa` is a thousandth of a pascal; most often, MPa is meant.
-_SMALLEST_UNIT = 0.01
+if TYPE_CHECKING:
+    from icha.configuration.campaign import Campaign
+    from icha.configuration.measurements import Measurement
 
-
-def _factor(unit: str, si_unit: str) -> float | None:
-    """Return the factor from a unit to an SI unit; None if the units belong to different quantities."""
-    try:
-        return float(conversion_factor(unit, si_unit))
-    except ValueError:
-        return None
+_NOT_UNLOADED = "is not unloaded; expected a study with `unload: true`"
+_NO_BOUNDARY_ELEMENTS = (
+    f"has no runs with boundary elements; expected a study with {REFERENCE_MODEL!r} among its `models`"
+)
 
 
-class Column(Section):
-    """A column of a table of measurements."""
+class FigureRequest(Section):
+    """A figure."""
 
-    column: Text
-    """Heading of the column."""
-    unit: Annotated[str, Field(strict=True)]
-    """Unit of the numbers in the column: `1` or `percent` for ratios, a unit of pressure for nominal pressures. If the
-    heading contains a unit, it must be the same unit."""
+    # True if drawing needs memory for all heights of the surface.
+    holds_topography: ClassVar[bool] = False
+
+    def problems(self, campaign: Campaign) -> Iterator[Problem]:
+        """Yield a problem for each option that does not fit the campaign, such as the name of an unknown study."""
+        yield from ()
+
+    def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
+        """Return the studies whose runs the figure shows."""
+        return ()
+
+    def inputs(self, campaign: Campaign, files: results.ResultFiles) -> dict[str, str | list[str]]:
+        """Return the path or the paths of input files, by argument of the function that draws."""
+        return {"campaign": files.path(results.DATASET)}
+
+    def arguments(self, campaign: Campaign) -> dict[str, Any]:
+        """Return the keyword arguments of the function that draws, except the data."""
+        return self.model_dump(exclude_none=True)
 
 
-class Measurement(Section):
-    """A table of measured contact areas. Figure 5 shows these areas together with the runs of a study."""
+class JKRFigure(FigureRequest):
+    """A figure of force and contact radius of one asperity against approach."""
 
-    path: File
-    """Path of a CSV file with headings in the first line. The path is relative to the configuration file."""
-    label: Text
-    """Name in the legend of the figure. Write formulas between two `$`."""
-    citation: Text
-    """Source of the numbers. The report prints this text."""
-    study: Name
-    """Name of the study that is compared with the measurement."""
-    load: Column
-    """Column of the loads. Loads with the unit `1` are reduced pressures p/(E* h'rms). Loads with a unit of pressure,
-    such as `kPa`, are nominal pressures, and need the key `material`."""
-    area: Column
-    """Column of the contact area fractions A/A0, with the unit `1` or `percent`."""
-    material: Name | None = None
-    """Material of the measurement. This key is required if the loads are nominal pressures."""
-    rms_slope: Positive | None = None
-    """Rms slope h'rms of the measured roughness. This key is required if the loads are nominal pressures; or, if a
-    surface of the study has a shape, if they are reduced pressures."""
+    tabor_parameter: Positive = Field(default=3.0, description="Tabor parameter, which sets the jump-in distance.")
 
-    @property
-    def load_is_pressure(self) -> bool:
-        """True if the column of the load contains nominal pressures."""
-        return _factor(self.load.unit, "1") is None
+    def inputs(self, campaign, files):
+        """Return no files."""
+        return {}
 
-    @property
-    def columns(self) -> dict[str, float]:
-        """Headings of the columns of load and area, with the factors that convert the numbers to SI units."""
-        load = _factor(self.load.unit, "Pa" if self.load_is_pressure else "1")
-        return {self.load.column: load, self.area.column: _factor(self.area.unit, "1")}
 
-    @model_validator(mode="after")
-    def _check_units(self):
-        load, area = self.load.unit, self.area.unit
-        if self.load_is_pressure and _factor(load, "Pa") is None:
-            raise ValueError(f"load: the unit is {load!r}; expected '1' or a unit of pressure, such as 'kPa'")
-        if self.load_is_pressure and _factor(load, "Pa") < _SMALLEST_UNIT:
-            raise ValueError(f"load: the unit {load!r} is implausibly small; expected 'MPa', 'kPa' or 'Pa'")
-        if _factor(area, "1") is None:
-            raise ValueError(f"area: the unit is {area!r}; expected '1' or 'percent'")
-        if self.load_is_pressure and self.material is None:
-            raise ValueError(f"load in {load!r} without material; expected this key, or the unit '1'")
-        for key, si_unit in (("load", "Pa" if self.load_is_pressure else "1"), ("area", "1")):
-            column = getattr(self, key)
-            if stated := contradicting_unit(column.column, column.unit, si_unit):
-                raise ValueError(
-                    f"{key}: the unit is {column.unit!r}, but the heading {column.column!r} states {stated!r}; "
-                    "expected the same unit. Correct `unit`, or the heading in the table and in `column`"
-                )
-            if problem := problem_with_numbers(column.column, column.unit, si_unit):
-                raise ValueError(
-                    f"{key}: the heading {column.column!r} {problem}. Correct `unit` or the table, and if the numbers "
-                    f"are in the unit {column.unit!r}, rename the heading in the table and in `column`"
-                )
-        return self
+class StudyFigure(FigureRequest):
+    """A figure of all runs of a study."""
 
-    def _beside_shape(self, campaign):
-        """Return whether a surface of the study has a shape. Then figure 5 shows relative loads F/(E* A0)."""
-        return any(campaign.surfaces[name].shape for name in campaign.studies[self.study].surfaces)
+    study: Name = Field(description="Name of the study that is drawn.")
 
-    def limits(self, campaign: Any) -> dict[str, tuple[float, str]]:
-        """Return the largest load and area in SI units, with texts for messages, by heading of the column."""
-        modulus = campaign.materials[self.material].contact_modulus if self.load_is_pressure else None
-        slope = self.rms_slope or math.nan  # without a limit if the slope is missing, which `problems` reports
-        if self._beside_shape(campaign):
-            most, reason = modulus or 1 / slope, "F/(E* A0) = 1, too large for linear elasticity"
-        else:
-            most = _FULL_CONTACT * (modulus * slope if modulus else 1.0)
-            reason = f"p/(E* h'rms) = {_FULL_CONTACT:.2g}, where every rough surface is in full contact"
-        load = format_quantity(most, "Pa") if modulus and most > 0 else f"{most:.3g}"
-        keys = "unit, material and rms_slope" if modulus else "unit"
-        return {
-            self.load.column: (most, f"{load} ({reason}); expected smaller loads. Correct {keys}"),
-            self.area.column: (1.0, "100 %; expected a fraction of the area. Check the unit of the column"),
-        }
+    def studies_of(self, campaign):
+        """Return the name of the only study that the figure shows."""
+        return (self.study,)
 
-    def problems(self, campaign: Any) -> Iterator[Problem]:
-        """Yield a problem for each name that the campaign does not define, and for loads without a needed rms slope."""
+    def problems(self, campaign):
+        """Yield a problem if the study does not exist; otherwise yield the problems from `study_problems`."""
         yield from unknown(("study",), self.study, campaign.studies)
-        if self.material is not None:
-            yield from unknown(("material",), self.material, campaign.materials)
-        if self.rms_slope is None and self.study in campaign.studies:
-            shaped = self._beside_shape(campaign)
-            if shaped != self.load_is_pressure:
-                loads = f"loads in {self.load.unit!r}" + (" beside a surface with a shape" if shaped else "")
-                yield ("rms_slope",), NOTHING, f"the key is missing; expected the measured rms slope, for {loads}"
+        if self.study in campaign.studies:
+            yield from self.study_problems(campaign, campaign.studies[self.study])
+
+    def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
+        """Yield a problem for each requested surface, seed, material or slope that the study does not have."""
+        for key, present in (
+            ("surface", study.surfaces),
+            ("seed", study.seeds),
+            ("material", study.materials),
+            ("rms_slope", study.rms_slopes),
+        ):
+            value = getattr(self, key, None)
+            if value is not None and value not in present:
+                yield (key,), value, f"is not in study {self.study!r}; expected one of {list_names(present)}"
 
 
-class _Drawn(Section):
+class TheoryFigure(StudyFigure):
+    """A figure of all runs of a study, with theories."""
+
+    def inputs(self, campaign, files):
+        """Also return the path of the theories for the study's first surface, if it is flat."""
+        surface = campaign.studies[self.study].surfaces[0]
+        theories = {"references": files.path(results.THEORIES, surface=surface)} if campaign.is_flat(surface) else {}
+        return super().inputs(campaign, files) | theories
+
+
+class TruthFigure(StudyFigure):
+    """A figure of all runs of a study, with boundary elements."""
+
+    boundary_elements: Name | None = Field(
+        default=None,
+        description="Name of a study whose runs with boundary elements are also drawn. Default: the study itself, if "
+        "it has such runs.",
+    )
+
+    def studies_of(self, campaign):
+        """Return the name of the study and, if different, the name of the study with boundary elements."""
+        return tuple(dict.fromkeys(filter(None, (self.study, self.boundary_elements))))
+
+    def problems(self, campaign):
+        """Also yield a problem if the study in `boundary_elements` does not exist or has no boundary elements."""
+        yield from super().problems(campaign)
+        location, name = ("boundary_elements",), self.boundary_elements
+        if name is not None:
+            yield from unknown(location, name, campaign.studies)
+            if name in campaign.studies and REFERENCE_MODEL not in campaign.studies[name].models:
+                yield location, name, _NO_BOUNDARY_ELEMENTS
+
+
+class SnapshotFigure(StudyFigure):
+    """A figure of one snapshot of a study."""
+
+    snapshot: Snapshot | None = Field(default=None, description="Snapshot of the study. Default: the first one.")
+
+    def study_problems(self, campaign, study):
+        """Also yield a problem if the study does not have the snapshot."""
+        yield from super().study_problems(campaign, study)
+        snapshots = study.saved_states
+        if snapshots == []:
+            yield ("study",), self.study, "has no snapshot to draw; expected a study with `snapshots`"
+        elif self.snapshot is not None and self.snapshot.kind_and_value not in (snapshots or []):
+            kept = list_names(f"{kind} {value:g}" for kind, value in snapshots or []) or "none"
+            kind, value = self.snapshot.kind_and_value
+            problem = f"is not a snapshot of study {self.study!r}; expected one of: {kept}"
+            yield ("snapshot",), f"{kind} {value:g}", problem
+
+    def arguments(self, campaign):
+        """Return the arguments with the `kind` and the `target` of the snapshot."""
+        arguments = super().arguments(campaign)
+        if arguments.pop("snapshot", None) is not None:
+            arguments["kind"], arguments["target"] = self.snapshot.kind_and_value
+        return arguments
+
+
+class UnitsFigure(FigureRequest):
+    """A figure in reduced or in physical units."""
+
+    units: Literal["reduced", "physical"] = Field(
+        default="reduced",
+        description="`reduced`: loads in units of E* h'rms, separations in units of the rms height. `physical`: "
+        "nominal pressures in Pa, and mean gaps (figure 13: mean separations) in m, with prefixes.",
+    )
+
+
+class TopographyFigure(StudyFigure):
+    """A figure of one topography of a study."""
+
+    surface: Label | None = Field(default=None, description="Surface to show. Default: the first surface of the study.")
+    seed: Seed | None = Field(default=None, description="Seed to show. Default: the first seed of the study.")
+
+
+class UnloadedFigure(StudyFigure):
+    """A figure of the runs of a study in loading and unloading."""
+
+    def study_problems(self, campaign, study):
+        """Also yield a problem if the study does not unload."""
+        yield from super().study_problems(campaign, study)
+        if not (study.unload or study.turning_points):
+            yield ("study",), self.study, _NOT_UNLOADED
+
+
+class RunFigure(TopographyFigure):
+    """A figure of one run. ICHA draws the first run that fits the options, if possible a run with adhesion."""
+
+    rms_slope: Positive | None = Field(default=None, description="Rms slope to show. Default: the study's first slope.")
+    material: Label | None = Field(
+        default=None, description="Material to show. Default: the first material with adhesion, if any."
+    )
+    holds_topography: ClassVar[bool] = True
+
+    def inputs(self, campaign, files):
+        """Also return the path of the surface file of the run."""
+        return super().inputs(campaign, files) | {"surface": files.path(results.SURFACE, self.run(campaign))}
+
+    def arguments(self, campaign):
+        """Return the arguments with the labels of the run."""
+        arguments = super().arguments(campaign)
+        others = arguments.keys() - set(RunLabels._fields)
+        return {name: arguments[name] for name in others} | {"run": tuple(self.run(campaign))}
+
+    def run(self, campaign: Campaign) -> RunLabels:
+        """Return the first run that fits the options; a run with adhesion is preferred."""
+        model = first_model(campaign.studies[self.study].models)
+        wanted = self.model_dump(include=set(RunLabels._fields), exclude_none=True)
+        runs = [contact._replace(model=model) for contact in campaign.contacts(self.study)]
+        runs = [run for run in runs if wanted.items() <= run._asdict().items()]
+        return next((run for run in runs if campaign.materials[run.material].surface_energy > 0), runs[0])
+
+
+class AreaAndGapFigure(UnitsFigure, TheoryFigure):
+    """A figure of all runs of a study. In physical units, theories are shown if all runs have one modulus and slope."""
+
+
+class MapFigure(SnapshotFigure, RunFigure):
+    """A figure of one snapshot. ICHA draws the first run that fits the options, if possible a run with adhesion."""
+
+    def inputs(self, campaign, files):
+        """Also return the path of the same run with boundary elements, if any."""
+        found, run = super().inputs(campaign, files), self.run(campaign)
+        if run.model == DEFAULT_MODEL and REFERENCE_MODEL in campaign.studies[self.study].models:
+            found["truth"] = files.path(results.RUN, run._replace(model=REFERENCE_MODEL))
+        return found
+
+
+class SlopesAndMaterialsFigure(TruthFigure):
+    """A figure of all runs of a study, with boundary elements and measurements."""
+
+    def inputs(self, campaign, files):
+        """Also return the paths of the tables of measurements for the study, if any."""
+        tables = [measurement.path for measurement in self.measurements(campaign)]
+        return super().inputs(campaign, files) | ({"tables": tables} if tables else {})
+
+    def arguments(self, campaign):
+        """Return the arguments with the `measurements`."""
+        known = []
+        for each in self.measurements(campaign):
+            names = ("label", "citation", "columns", "material", "rms_slope")
+            modulus = campaign.materials[each.material].contact_modulus if each.load_is_pressure else None
+            known.append({name: getattr(each, name) for name in names} | {"contact_modulus": modulus})
+        return super().arguments(campaign) | ({"measurements": known} if known else {})
+
+    def measurements(self, campaign: Campaign) -> list[Measurement]:
+        """Return the measurements that belong to the study."""
+        return [measurement for measurement in campaign.measurements.values() if measurement.study == self.study]
+
+
+class SlopesFigure(TopographyFigure):
+    """A figure of the spots of all slopes, at the same load and at the same area."""
+
+    material: Label | None = Field(default=None, description="Material to show. Default: the study's first material.")
+
+    def study_problems(self, campaign, study):
+        """Also yield a problem if the study does not have snapshots of both kinds."""
+        yield from super().study_problems(campaign, study)
+        kinds = [kind for kind, _ in study.saved_states or []]
+        for kind in ("relative_load", "area_fraction"):
+            if kind not in kinds:
+                yield ("study",), self.study, f"has no snapshot of kind {kind}; expected a study with such a snapshot"
+
+
+class ComparedFigure(StudyFigure):
+    """A comparison with boundary elements. The study needs both models."""
+
+    def inputs(self, campaign, files):
+        """Also return the path of the model error. The campaign dataset determines the colours."""
+        return super().inputs(campaign, files) | {"model_error": files.path(results.MODEL_ERROR)}
+
+    def study_problems(self, campaign, study):
+        """Also yield a problem if the study has no boundary elements at the loads of its asperity runs."""
+        yield from super().study_problems(campaign, study)
+        if not campaign.compares_models(self.study):
+            expected = "expected a study with both `models` and targets `reduced_pressures`"
+            yield ("study",), self.study, f"has no boundary elements at the same loads; {expected}"
+
+
+class LoopsFigure(UnitsFigure, TruthFigure, TopographyFigure, UnloadedFigure):
+    """A figure of the runs of a study in loading and unloading, on one topography."""
+
+
+def _problems_of_unloading(campaign: Campaign, studies: Mapping[tuple, str]) -> Iterator[Problem]:
+    """Yield a problem for each study that does not exist or does not unload; `studies` maps keys to names."""
+    for location, name in studies.items():
+        yield from unknown(location, name, campaign.studies)
+        if name in campaign.studies and not campaign.studies[name].unload:
+            yield location, name, _NOT_UNLOADED
+
+
+class PullOffFigure(StudyFigure):
+    """A figure of the pull-off pressure of all runs of some studies."""
+
+    load_studies: list_of_names() | None = Field(
+        default=None, description="Names of studies that differ in their largest load, for a second panel."
+    )
+
+    def studies_of(self, campaign):
+        """Return the studies of both panels."""
+        return tuple(dict.fromkeys([self.study, *(self.load_studies or ())]))
+
+    def problems(self, campaign):
+        """Yield a problem for each study that does not exist or does not unload completely."""
+        loads = {("load_studies", k): name for k, name in enumerate(self.load_studies or ())}
+        yield from _problems_of_unloading(campaign, loads | {("study",): self.study})
+
+
+class LossFigure(FigureRequest):
+    """A figure of the energy lost in a cycle of loading and unloading, for all runs of some studies."""
+
+    studies: list_of_names()
+    """Names of the studies that are drawn. Lines are fitted to runs that differ only in their largest load."""
+
+    def studies_of(self, campaign):
+        """Return the names of all studies of the figure."""
+        return tuple(dict.fromkeys(self.studies))
+
+    def problems(self, campaign):
+        """Yield a problem for each study that does not exist or does not unload."""
+        yield from _problems_of_unloading(campaign, {("studies", k): name for k, name in enumerate(self.studies)})
+
+
+class SnapMapFigure(RunFigure, UnloadedFigure):
+    """A figure of jumps and unions in one run: the first run that fits the options, if possible with adhesion."""
+
+
+class IndenterFigure(UnloadedFigure):
+    """A figure of the runs of a study with indenters, in loading and unloading."""
+
+    def study_problems(self, campaign, study):
+        """Also yield a problem if a surface of the study is periodic."""
+        yield from super().study_problems(campaign, study)
+        if periodic := [name for name in study.surfaces if not campaign.is_free(name)]:
+            expected = "expected surfaces with `shape` or `boundary: free`"
+            yield ("study",), self.study, f"has the periodic surface {periodic[0]!r}; {expected}"
+
+
+class PressureMapsFigure(RunFigure):
+    """A figure of one run with boundary elements, with a map for each of its snapshots."""
+
+    def inputs(self, campaign, files):
+        """Return the paths of the campaign dataset and of the file of the run, which contains the maps."""
+        run = files.path(results.RUN, self.run(campaign))
+        return {"campaign": files.path(results.DATASET), "maps": run}
+
+    def study_problems(self, campaign, study):
+        """Also yield a problem if the study has no boundary elements, or no snapshot."""
+        yield from super().study_problems(campaign, study)
+        if REFERENCE_MODEL not in study.models:
+            yield ("study",), self.study, _NO_BOUNDARY_ELEMENTS
+        if study.saved_states == []:
+            yield ("study",), self.study, "has no snapshot to draw; expected a study with `snapshots`"
+
+    def run(self, campaign):
+        """Return the first run with boundary elements that fits the options; a run with adhesion is preferred."""
+        return super().run(campaign)._replace(model=REFERENCE_MODEL)
+
+
+class SampleFigure(StudyFigure):
+    """A figure of the sampled cases of a study."""
+
+    target: int = Field(default=-1, ge=-1, description="Number of the target, from 0. Default (-1): the last target.")
+
+    def inputs(self, campaign, files):
+        """Return the path of the file of sampled cases."""
+        return {"sensitivity": files.path(results.SENSITIVITY)}
+
+    def study_problems(self, campaign, study):
+        """Yield a problem if the study has no `sample`, or not this target."""
+        if study.sample is None:
+            yield ("study",), self.study, "has no sampled cases; expected a study with `sample`"
+        last = len(study.targets.states) - 1
+        if self.target > last:
+            yield ("target",), self.target, f"is not the number of a target; expected -1, 0, … {last}"
+
+
+class ParametersFigure(SampleFigure):
+    """A figure of one result of the sampled cases of a study."""
+
+    quantity: Literal[(*ESTIMATED_AT_TARGETS, *ESTIMATED_OF_LOOPS)] = Field(
+        default="contact_area_fraction", description="Result to show."
+    )
+
+    def study_problems(self, campaign, study):
+        """Also yield a problem for a quantity of a loop if the study does not unload."""
+        yield from super().study_problems(campaign, study)
+        if self.quantity in ESTIMATED_OF_LOOPS and not study.unload:
+            yield ("quantity",), self.quantity, "is a quantity of a loop; expected a study with `unload: true`"
+
+
+class OwnFigure(StudyFigure):
+    """A figure of your own. The key is the name of its files."""
+
+    script: File = Field(
+        description="Python file with a function `draw(study)`. The function receives the dataset of the study "
+        "(xarray.Dataset), and returns a figure of matplotlib. Its docstring is the caption. The file may import "
+        "modules in its folder. The path is relative to the configuration file."
+    )
+
+    def inputs(self, campaign, files):
+        """Also return the path of the script."""
+        return super().inputs(campaign, files) | {"script": self.script}
+
+    def arguments(self, campaign):
+        """Return the name of the study; the script is an input."""
+        return {"study": self.study}
+
+
+class Figures(Section):
+    """Figures of the campaign by name. ICHA draws only these figures. Other names are figures of your own."""
+
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[Name, OwnFigure]
+    fig1_jkr: JKRFigure | None = None
+    """Force and radius of one asperity against approach."""
+    fig2_area_and_gap: AreaAndGapFigure | None = None
+    """Contact area and mean separation against load, with theories, and differences between the models."""
+    fig3_distributions: SnapshotFigure | None = None
+    """Distributions of gap and pressure of every material, on the study's first surface."""
+    fig4_contact_map: MapFigure | None = None
+    """Contact spots over the topography."""
+    fig5_multi_slope: SlopesAndMaterialsFigure | None = None
+    """Contact area against load for all slopes and materials, with measurements."""
+    fig6_spots_by_slope: SlopesFigure | None = None
+    """Contact spots of all slopes at the same load and at the same area. The study needs snapshots of kinds
+    relative_load and area_fraction."""
+    fig7_stiffness: TheoryFigure | None = None
+    """Contact stiffness against load, with a theory."""
+    fig8_patch_sizes: SnapshotFigure | None = None
+    """Sizes of the contact patches of every material, on the study's first surface."""
+    fig9_tabor: SnapshotFigure | None = None
+    """Contact area and mean separation against the Tabor parameter, for studies whose materials differ in
+    `interaction_range`. For smooth spheres that are pulled off: pull-off force and loss."""
+    fig10_model_error: ComparedFigure | None = None
+    """Error of contact area and mean separation of the asperity model, relative to boundary elements."""
+    fig11_distribution_error: ComparedFigure | None = None
+    """Differences of distributions and contact maps between the asperity model and boundary elements."""
+    fig13_loops: LoopsFigure | None = None
+    """Pressure against mean separation and contact area against load, in loading and unloading."""
+    fig14_pull_off: PullOffFigure | None = None
+    """Pull-off pressure against rms slope, and against the largest load."""
+    fig15_loss: LossFigure | None = None
+    """Energy lost in a cycle against the largest contact area, and the causes of the loss."""
+    fig16_snap_map: SnapMapFigure | None = None
+    """Where and when spots of one run snap into and out of contact."""
+    fig17_force_indentation: IndenterFigure | None = None
+    """Force against indentation of indenters, in loading and unloading, with Hertz and JKR."""
+    fig18_jkr_plot: IndenterFigure | None = None
+    """Linearised JKR plot of spherical indenters, with fits to loading and unloading."""
+    fig19_work_of_adhesion: IndenterFigure | None = None
+    """Apparent work of adhesion of spherical indenters against the rms height of their roughness."""
+    fig20_pressure_maps: PressureMapsFigure | None = None
+    """Maps of the contact pressure of a run with boundary elements, at all its snapshots."""
+    fig21_sensitivity: SampleFigure | None = None
+    """Share of the variance of each result that each sampled parameter causes, alone and in all."""
+    fig22_parameters: ParametersFigure | None = None
+    """A result of the sampled cases against each sampled parameter, with its mean over the others."""
 
-    def by_name(self) -> dict[str, FigureOptions]:
-        """Return the options of each figure to draw, by the name of the figure."""
+    def by_name(self) -> dict[str, FigureRequest]:
+        """Return the request of each figure to draw, by the name of the figure."""
         drawn = {name: getattr(self, name) for name in type(self).model_fields}
-        return {name: options for name, options in drawn.items() if options is not None} | self.model_extra
+        return {name: request for name, request in drawn.items() if request is not None} | self.model_extra
 
     def in_folder(self, folder: Path) -> Self:
         """Return the figures with `folder` in front of the paths of the scripts."""
@@ -153,18 +469,12 @@ class _Drawn(Section):
                 modules_of(own.script)
             except ValueError as error:
                 yield ("figures", name, "script"), own.script, str(error)
-            if figure_number(name):
+            if results.figure_number(name):
                 yield ("figures", name), name, "begins like the name of a figure of ICHA; expected another name"
 
 
-Figures = create_model(
-    "Figures",
-    __base__=_Drawn,
-    __doc__="Figures of the campaign. Each key is the name of a figure. ICHA draws only the figures that are given. "
-    "Other names are figures of your own.",
-    __module__=__name__,
-    **{
-        name: (declaration.options | None, Field(default=None, description=declaration.description))
-        for name, declaration in DECLARATIONS.items()
-    },
-)
+def drawing(campaign: Campaign, name: str, files: results.ResultFiles) -> dict[str, Any]:
+    """Return the arguments of `icha.figures.registry.draw_figure` for a figure, without the paths of its files."""
+    request = campaign.figures.by_name()[name]
+    data, arguments = request.inputs(campaign, files), request.arguments(campaign)
+    return {"name": name, "inputs": data, "arguments": arguments, "studies": request.studies_of(campaign)}

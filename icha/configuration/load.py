@@ -40,7 +40,7 @@ from icha.configuration.yaml_files import (
     read_yaml,
 )
 from icha.datasets.results import CHOSEN_LEVELS
-from icha.figures.own_figure import modules_of
+from icha.support.scripts import modules_of
 from icha.support.values import NAME_PATTERN, NOTHING, Problem
 
 

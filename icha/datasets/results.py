@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 from icha.datasets import labels
@@ -37,6 +38,12 @@ VALUES_IN_CHUNK = 2**18
 COMPRESSION = {"zlib": True, "complevel": 4, "shuffle": True}
 # An array of a campaign dataset is read as a whole if its size in bytes is at most this number.
 LEFT_IN_FILE = 2**26
+
+
+def figure_number(name: str) -> int | None:
+    """Return the number in the name of a figure; None for a figure of the user's own."""
+    numbered = re.match(r"fig(\d+)_", name)
+    return numbered and int(numbered[1])
 
 
 @dataclass(frozen=True)

@@ -11,13 +11,6 @@ from icha.contact.models import MODELS, REFERENCE_MODEL
 from icha.datasets.quantities import label_of
 from icha.figures import select
 from icha.figures.curves import Axis, physical_units
-from icha.figures.declaration import (
-    Declaration,
-    TopographyFigure,
-    TruthFigure,
-    UnitsFigure,
-    UnloadedFigure,
-)
 from icha.figures.looks import (
     BRANCH_DASHES,
     MODEL_MARKERS,
@@ -33,15 +26,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-
-class LoopsFigure(UnitsFigure, TruthFigure, TopographyFigure, UnloadedFigure):
-    """A figure of the runs of a study in loading and unloading, on one topography."""
-
-
-DECLARATION = Declaration(
-    description="Pressure against mean separation and contact area against load, in loading and unloading.",
-    options=LoopsFigure,
-)
 
 # All slopes share a panel if there are at most this number of loops.
 _MOST_LOOPS = 4

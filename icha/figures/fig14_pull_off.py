@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from pydantic import Field
 
 from icha.contact.models import REFERENCE_MODEL
 from icha.datasets.quantities import label_of
 from icha.figures.curves import cross_look, drop_rounding_errors
-from icha.figures.declaration import Campaign, Declaration, StudyFigure, problems_of_unloading
 from icha.figures.ensembles import Points, points_handles
 from icha.figures.looks import (
     ASPERITIES_NAME,
@@ -27,33 +25,11 @@ from icha.figures.looks import (
 from icha.figures.select import names_of_models, select_detached_lines
 from icha.figures.style import GREY, ONE_COLUMN, TWO_COLUMNS, in_style, logarithmic_axes, new_panels
 from icha.support.formatting import choose_unit
-from icha.support.values import Problem, list_of_names
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-
-class PullOffFigure(StudyFigure):
-    """A figure of the pull-off pressure of all runs of some studies."""
-
-    load_studies: list_of_names() | None = Field(
-        default=None, description="Names of studies that differ in their largest load, for a second panel."
-    )
-
-    def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
-        """Return the studies of both panels."""
-        return tuple(dict.fromkeys([self.study, *(self.load_studies or ())]))
-
-    def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """Yield a problem for each study that does not exist or does not unload completely."""
-        loads = {("load_studies", k): name for k, name in enumerate(self.load_studies or ())}
-        yield from problems_of_unloading(campaign, loads | {("study",): self.study})
-
-
-DECLARATION = Declaration(
-    description="Pull-off pressure against rms slope, and against the largest load.", options=PullOffFigure
-)
 
 # The axis is linear if the ratio of the largest to the smallest positive value is at most this number, without and with
 # zeros.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,37 +11,15 @@ import numpy as np
 from icha.contact.models import REFERENCE_MODEL
 from icha.datasets.quantities import LOSS_PARTS, label_of
 from icha.figures.curves import cross_look
-from icha.figures.declaration import Campaign, Declaration, FigureOptions, problems_of_unloading
 from icha.figures.ensembles import Points, points_handles
 from icha.figures.looks import ASPERITIES_NAME, REFERENCE_NAME, legend_below, looks_of_studies, model_handle, pale
 from icha.figures.select import ContactRuns, NothingToDraw, names_of_models, select_detached_lines
 from icha.figures.style import GREY, in_style, logarithmic_axes, new_panels
-from icha.support.values import Problem, list_of_names
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-
-class LossFigure(FigureOptions):
-    """A figure of the energy lost in a cycle of loading and unloading, for all runs of some studies."""
-
-    studies: list_of_names()
-    """Names of the studies that are drawn. Lines are fitted to runs that differ only in their largest load."""
-
-    def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
-        """Return the names of all studies of the figure."""
-        return tuple(dict.fromkeys(self.studies))
-
-    def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """Yield a problem for each study that does not exist or does not unload."""
-        yield from problems_of_unloading(campaign, {("studies", k): name for k, name in enumerate(self.studies)})
-
-
-DECLARATION = Declaration(
-    description="Energy lost in a cycle against the largest contact area, and the causes of the loss.",
-    options=LossFigure,
-)
 
 # Look of the bar of each part of the loss. No bar has the colour of a material.
 PARTS = dict(

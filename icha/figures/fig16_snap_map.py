@@ -9,10 +9,8 @@ import numpy as np
 
 from icha.contact.model import EVENT_KINDS
 from icha.contact.models import REFERENCE_MODEL
-from icha.datasets import results
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of
-from icha.figures.declaration import Campaign, Declaration, Inputs, RunFigure, UnloadedFigure
 from icha.figures.looks import BRANCH_DASHES, COARSE_GRID_ALONE, NOT_APPLICABLE_ALONE, legend_below
 from icha.figures.maps import topography_of
 from icha.figures.select import is_good_loop, select_complete_run, unloading_legs
@@ -21,23 +19,6 @@ from icha.figures.style import BLACK, GREY, in_style, legend_handle, material_la
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
-
-
-class SnapMapFigure(RunFigure, UnloadedFigure):
-    """A figure of jumps and unions in one run: the first run that fits the options, if possible with adhesion."""
-
-
-def inputs(campaign: Campaign, options: SnapMapFigure, files: results.ResultFiles) -> Inputs:
-    """Return the paths of the campaign dataset and of the surface file of the run."""
-    return {"campaign": files.path(results.DATASET), "surface": files.path(results.SURFACE, options.run(campaign))}
-
-
-DECLARATION = Declaration(
-    description="Where and when spots of one run snap into and out of contact.",
-    options=SnapMapFigure,
-    inputs=inputs,
-    holds_topography=True,
-)
 
 
 _RED = (0.9, 0.0, 0.05)

@@ -8,8 +8,7 @@ import numpy as np
 
 from icha.datasets.quantities import label_of
 from icha.figures import select
-from icha.figures.declaration import Declaration
-from icha.figures.indenter_curves import IndenterFigure, select_series, theory_curves
+from icha.figures.indenter_curves import select_series, theory_curves
 from icha.figures.looks import BRANCH_DASHES, legend_below
 from icha.figures.style import BLACK, GREY, in_style, legend_handle, new_panels
 from icha.support.formatting import choose_unit
@@ -18,10 +17,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-DECLARATION = Declaration(
-    description="Force against indentation of indenters, in loading and unloading, with Hertz and JKR.",
-    options=IndenterFigure,
-)
 
 # Largest number of series in a panel.
 _MOST_SERIES = 3

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.figures.declaration import Declaration
-from icha.figures.indenter_curves import IndenterFigure, select_series
+from icha.figures.indenter_curves import select_series
 from icha.figures.looks import legend_below
 from icha.figures.style import GREY, in_style, legend_handle, new_panels
 from icha.support.formatting import choose_unit, format_quantity
@@ -16,10 +15,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-DECLARATION = Declaration(
-    description="Linearised JKR plot of spherical indenters, with fits to loading and unloading.",
-    options=IndenterFigure,
-)
 
 # Variables of the works of adhesion; title of the panel and marker of the states.
 _TITLES = {"approach": ("loading", "o"), "retraction": ("unloading", "s")}

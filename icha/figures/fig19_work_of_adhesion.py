@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.figures.declaration import Declaration
-from icha.figures.indenter_curves import IndenterFigure, select_series
+from icha.figures.indenter_curves import select_series
 from icha.figures.looks import distinct_colours, legend_below
 from icha.figures.select import NothingToDraw
 from icha.figures.style import COLOURS, GREY, ONE_COLUMN, in_style, legend_handle, new_figure
@@ -18,10 +17,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-DECLARATION = Declaration(
-    description="Apparent work of adhesion of spherical indenters against the rms height of their roughness.",
-    options=IndenterFigure,
-)
 
 # Name in the legend and marker of each quantity.
 _QUANTITIES = {

@@ -5,25 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from pydantic import Field
 
-from icha.figures.declaration import Declaration, FigureOptions
 from icha.figures.style import BLUE, GREY, VERMILLION, in_style, new_panels
-from icha.support.values import Positive
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-
-class JKRFigure(FigureOptions):
-    """A figure of force and contact radius of one asperity against approach."""
-
-    tabor_parameter: Positive = Field(default=3.0, description="Tabor parameter, which sets the jump-in distance.")
-
-
-DECLARATION = Declaration(
-    description="Force and radius of one asperity against approach.", options=JKRFigure, inputs=lambda *_: {}
-)
 
 
 @in_style

@@ -2,54 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.contact.models import REFERENCE_MODEL
-from icha.datasets import results
 from icha.datasets.labels import RunLabels
-from icha.figures.declaration import Campaign, Declaration, Inputs, RunFigure
 from icha.figures.looks import run_label
 from icha.figures.maps import average_blocks
 from icha.figures.style import format_number, in_style, new_panels
 from icha.support.formatting import choose_unit, format_quantity
-from icha.support.values import Problem
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-
-class MapsFigure(RunFigure):
-    """A figure of one run with boundary elements, with a map for each of its snapshots."""
-
-    def study_problems(self, campaign: Campaign, study) -> Iterator[Problem]:
-        """Also yield a problem if the study has no boundary elements, or no snapshot."""
-        yield from super().study_problems(campaign, study)
-        if REFERENCE_MODEL not in study.models:
-            expected = f"expected a study with {REFERENCE_MODEL!r} among its `models`"
-            yield ("study",), self.study, f"has no runs with boundary elements; {expected}"
-        if campaign.studies[self.study].saved_states == []:
-            yield ("study",), self.study, "has no snapshot to draw; expected a study with `snapshots`"
-
-    def run(self, campaign: Campaign) -> RunLabels:
-        """Return the first run with boundary elements that fits the options; a run with adhesion is preferred."""
-        return super().run(campaign)._replace(model=REFERENCE_MODEL)
-
-
-def inputs(campaign: Campaign, options: MapsFigure, files: results.ResultFiles) -> Inputs:
-    """Return the paths of the campaign dataset and of the file of the run, which contains the maps."""
-    return {"campaign": files.path(results.DATASET), "maps": files.path(results.RUN, options.run(campaign))}
-
-
-DECLARATION = Declaration(
-    description="Maps of the contact pressure of a run with boundary elements, at all its snapshots.",
-    options=MapsFigure,
-    inputs=inputs,
-    holds_topography=True,
-)
 
 _MOST_MAPS = 6
 _COLUMNS = 3

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.datasets.quantities import symbol_of
-from icha.figures.declaration import Declaration
 from icha.figures.looks import legend_below
-from icha.figures.samples import SampleFigure, responses, sample_inputs, title_of
+from icha.figures.samples import responses, title_of
 from icha.figures.select import NothingToDraw
 from icha.figures.style import BLUE, GREY, TWO_COLUMNS, in_style, new_panels
 
@@ -17,11 +16,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-DECLARATION = Declaration(
-    description="Share of the variance of each result that each sampled parameter causes, alone and in all.",
-    options=SampleFigure,
-    inputs=sample_inputs,
-)
 _COLUMNS = 2
 _BAR = 0.36
 _CAP = {"ecolor": GREY, "elinewidth": 0.8, "capsize": 1.5, "ls": "none"}

@@ -2,44 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
-from pydantic import Field
 
 from icha.datasets import quantities
-from icha.figures.declaration import Campaign, Declaration
 from icha.figures.looks import legend_below
-from icha.figures.samples import SampleFigure, best_model, responses, sample_inputs, scale_of, title_of
+from icha.figures.samples import best_model, responses, scale_of, title_of
 from icha.figures.style import BLUE, TWO_COLUMNS, VERMILLION, in_style, legend_handle, logarithmic_axes, new_panels
-from icha.path.targets import ESTIMATED_AT_TARGETS, ESTIMATED_OF_LOOPS
-from icha.support.values import Problem
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
 
-class ParametersFigure(SampleFigure):
-    """A figure of one result of the sampled cases of a study."""
-
-    quantity: Literal[(*ESTIMATED_AT_TARGETS, *ESTIMATED_OF_LOOPS)] = Field(
-        default="contact_area_fraction", description="Result to show."
-    )
-
-    def study_problems(self, campaign: Campaign, study) -> Iterator[Problem]:
-        """Also yield a problem for a quantity of a loop if the study does not unload."""
-        yield from super().study_problems(campaign, study)
-        if self.quantity in ESTIMATED_OF_LOOPS and not study.unload:
-            yield ("quantity",), self.quantity, "is a quantity of a loop; expected a study with `unload: true`"
-
-
-DECLARATION = Declaration(
-    description="A result of the sampled cases against each sampled parameter, with its mean over the others.",
-    options=ParametersFigure,
-    inputs=sample_inputs,
-)
 _COLUMNS = 3
 # The axis of the result is logarithmic if the largest value is so many times the smallest.
 _DECADE = 5.0

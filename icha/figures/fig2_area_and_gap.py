@@ -8,7 +8,6 @@ import numpy as np
 
 from icha.datasets.quantities import label_of, quantity
 from icha.figures import curves
-from icha.figures.declaration import Declaration, StudyFigure, UnitsFigure, dataset_and_theories
 from icha.figures.ensembles import draw_members
 from icha.figures.style import BLACK, GREY, in_style, logarithmic_axes, new_panels
 
@@ -16,16 +15,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-
-class AreaAndGapFigure(UnitsFigure, StudyFigure):
-    """A figure of all runs of a study. In physical units, theories are shown if all runs have one modulus and slope."""
-
-
-DECLARATION = Declaration(
-    description="Contact area and mean separation against load, with theories, and differences between the models.",
-    options=AreaAndGapFigure,
-    inputs=dataset_and_theories,
-)
 
 # Height of the lower panels divided by the height of the upper panels. The lower panels show differences.
 _LOWER = 0.42

@@ -9,7 +9,6 @@ import numpy as np
 
 from icha.contact.attraction import FINITE_RANGE
 from icha.figures.curves import add_snapshot_legend, drop_rounding_errors, snapshot_looks
-from icha.figures.declaration import Declaration, SnapshotFigure
 from icha.figures.ensembles import draw_members, join_bins
 from icha.figures.looks import MODEL_MARKERS, REFERENCE_NAME, TRUTH_LINE
 from icha.figures.select import has_shape, select_snapshots
@@ -19,11 +18,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-
-DECLARATION = Declaration(
-    description="Distributions of gap and pressure of every material, on the study's first surface.",
-    options=SnapshotFigure,
-)
 
 # Smallest number of grid cells in a bin of P(u). Bins with fewer cells are joined with their neighbours.
 _LEAST_CELLS = 100

@@ -7,10 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
-from icha.datasets import results
 from icha.datasets.labels import RunLabels
-from icha.figures.declaration import Campaign, Declaration, Inputs, RunFigure, SnapshotFigure
 from icha.figures.looks import NOT_APPLICABLE_ALONE, REFERENCE_NAME, run_label
 from icha.figures.maps import draw_map, draw_spots, topography_of, wrap_circles
 from icha.figures.select import is_applicable, select_complete_run
@@ -20,23 +17,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-
-class MapFigure(SnapshotFigure, RunFigure):
-    """A figure of one snapshot. ICHA draws the first run that fits the options, if possible a run with adhesion."""
-
-
-def inputs(campaign: Campaign, options: MapFigure, files: results.ResultFiles) -> Inputs:
-    """Return the paths of the campaign dataset, the surface file and, if any, the same run with boundary elements."""
-    run = options.run(campaign)
-    found = {"campaign": files.path(results.DATASET), "surface": files.path(results.SURFACE, run)}
-    if run.model == DEFAULT_MODEL and REFERENCE_MODEL in campaign.studies[options.study].models:
-        found["truth"] = files.path(results.RUN, run._replace(model=REFERENCE_MODEL))
-    return found
-
-
-DECLARATION = Declaration(
-    description="Contact spots over the topography.", options=MapFigure, inputs=inputs, holds_topography=True
-)
 
 # The surface is _ZOOM times as wide as the enlarged window. A window that is wider than _WIDEST_IN_RADII times the mean
 # radius of the spots is halved repeatedly, but not to fewer than _LEAST_CELLS cells along a side.

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from icha.datasets import results
 from icha.datasets.quantities import label_of
 from icha.figures.curves import (
     add_legend,
@@ -17,7 +16,6 @@ from icha.figures.curves import (
     ratio_points,
     study_curves,
 )
-from icha.figures.declaration import Campaign, Declaration, Inputs, TruthFigure
 from icha.figures.looks import ASPERITIES_NAME, MODEL_MARKERS, REFERENCE_NAME, TRUTH_LINE, model_handle, surface_label
 from icha.figures.select import has_shape
 from icha.figures.style import DASHES, in_style, new_panels
@@ -26,36 +24,6 @@ from icha.support.tables import read_columns
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
-
-
-class SlopesAndMaterialsFigure(TruthFigure):
-    """A figure of all runs of a study, with boundary elements and measurements."""
-
-    def arguments(self, campaign: Campaign) -> dict[str, Any]:
-        """Return the arguments of `figure`, with the `measurements`."""
-        known = []
-        for each in self.measurements(campaign):
-            names = ("label", "citation", "columns", "material", "rms_slope")
-            modulus = campaign.materials[each.material].contact_modulus if each.load_is_pressure else None
-            known.append({name: getattr(each, name) for name in names} | {"contact_modulus": modulus})
-        return super().arguments(campaign) | ({"measurements": known} if known else {})
-
-    def measurements(self, campaign: Campaign) -> list:
-        """Return the measurements that belong to the study."""
-        return [measurement for measurement in campaign.measurements.values() if measurement.study == self.study]
-
-
-def inputs(campaign: Campaign, options: SlopesAndMaterialsFigure, files: results.ResultFiles) -> Inputs:
-    """Return the paths of the campaign dataset and of the tables of measurements for the study, if any."""
-    tables = [measurement.path for measurement in options.measurements(campaign)]
-    return {"campaign": files.path(results.DATASET)} | ({"tables": tables} if tables else {})
-
-
-DECLARATION = Declaration(
-    description="Contact area against load for all slopes and materials, with measurements.",
-    options=SlopesAndMaterialsFigure,
-    inputs=inputs,
-)
 
 
 # Largest number of surfaces that have their own columns of panels.

@@ -2,45 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from pydantic import Field
-
-from icha.figures.declaration import Campaign, Declaration, TopographyFigure
 from icha.figures.looks import NOT_APPLICABLE_ALONE, graded_colours, legend_below
 from icha.figures.maps import draw_spots, wrap_circles
 from icha.figures.select import is_applicable, select_by_labels, select_runs, snapshot_label
 from icha.figures.style import in_style, new_panels, slope_label
 from icha.support.formatting import choose_unit
-from icha.support.values import Label, Problem
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-
-class SlopesFigure(TopographyFigure):
-    """A figure of the spots of all slopes, at the same load and at the same area."""
-
-    material: Label | None = Field(default=None, description="Material to show. Default: the study's first material.")
-
-    def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
-        """Also yield a problem if the study does not have snapshots of both kinds."""
-        yield from super().study_problems(campaign, study)
-        kinds = [kind for kind, _ in campaign.studies[self.study].saved_states or []]
-        for kind in ("relative_load", "area_fraction"):
-            if kind not in kinds:
-                yield ("study",), self.study, f"has no snapshot of kind {kind}; expected a study with such a snapshot"
-
-
-DECLARATION = Declaration(
-    description=(
-        "Contact spots of all slopes at the same load and at the same area. The study needs snapshots of kinds "
-        "relative_load and area_fraction."
-    ),
-    options=SlopesFigure,
-)
 
 _KINDS = ("relative_load", "area_fraction")
 

@@ -8,18 +8,12 @@ import numpy as np
 
 from icha.datasets.quantities import label_of
 from icha.figures.curves import add_legend, draw_curves, drop_rounding_errors, study_curves
-from icha.figures.declaration import Declaration, StudyFigure, dataset_and_theories
 from icha.figures.select import NothingToDraw
 from icha.figures.style import BLACK, in_style, new_panels
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
-
-
-DECLARATION = Declaration(
-    description="Contact stiffness against load, with a theory.", options=StudyFigure, inputs=dataset_and_theories
-)
 
 
 @in_style

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.figures.curves import add_snapshot_legend, snapshot_looks
-from icha.figures.declaration import Declaration, SnapshotFigure
 from icha.figures.ensembles import draw_members, join_bins
 from icha.figures.looks import MODEL_MARKERS, REFERENCE_NAME, TRUTH_LINE
 from icha.figures.select import select_snapshots
@@ -19,10 +18,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-
-DECLARATION = Declaration(
-    description="Sizes of the contact patches of every material, on the study's first surface.", options=SnapshotFigure
-)
 
 # Smallest number of patches in a bin of the density. Bins with fewer patches are joined with their neighbours.
 _LEAST_PATCHES = 10

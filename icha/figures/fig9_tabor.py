@@ -9,7 +9,6 @@ import numpy as np
 from icha.contact.attraction import FINITE_RANGE, SHORT_RANGE
 from icha.datasets.quantities import label_of
 from icha.figures.curves import gap_label
-from icha.figures.declaration import Declaration, SnapshotFigure
 from icha.figures.ensembles import Points, points_handles
 from icha.figures.looks import Looks, legend_below, named_handles
 from icha.figures.select import ContactRuns, NothingToDraw, group_by_contact, select_runs, snapshot_label
@@ -19,14 +18,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-
-DECLARATION = Declaration(
-    description=(
-        "Contact area and mean separation against the Tabor parameter, for studies whose materials differ in "
-        "`interaction_range`. For smooth spheres that are pulled off: pull-off force and loss."
-    ),
-    options=SnapshotFigure,
-)
 
 # The axis of the Tabor parameter is logarithmic if the ratio of its largest to its smallest value exceeds this number.
 _SPAN = 10.0

@@ -2,35 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from icha.contact.models import REFERENCE_MODEL
 from icha.figures import select
-from icha.figures.declaration import Campaign, UnloadedFigure
 from icha.figures.looks import distinct_colours, graded_colours
 from icha.figures.style import BLACK
 from icha.support.formatting import format_quantity
-from icha.support.values import Problem
 
 if TYPE_CHECKING:
     import xarray as xr
 
 # Points of a theoretical curve.
 _POINTS = 400
-
-
-class IndenterFigure(UnloadedFigure):
-    """A figure of the runs of a study with indenters, in loading and unloading."""
-
-    def study_problems(self, campaign: Campaign, study) -> Iterator[Problem]:
-        """Also yield a problem if a surface of the study is periodic."""
-        yield from super().study_problems(campaign, study)
-        if periodic := [name for name in study.surfaces if not campaign.is_free(name)]:
-            expected = "expected surfaces with `shape` or `boundary: free`"
-            yield ("study",), self.study, f"has the periodic surface {periodic[0]!r}; {expected}"
 
 
 class Series(NamedTuple):

@@ -1,36 +1,27 @@
-"""Find and draw the figures; each figure is a module of this folder whose name begins with `fig` and a number.
+"""Draw figures by their names: each figure is a module `fig<number>_<words>` with a function `figure`.
 
-The module `own_figure` draws all figures of the user's own, whose names do not begin in this way.
+The module `own_figure` draws all figures of the user's own, whose names do not begin in this way. The function `figure`
+receives the data and the arguments that the request of the figure names (`icha.configuration.figures`). It raises
+`icha.figures.select.NothingToDraw` if no run in the figure is complete.
 """
 
 from __future__ import annotations
 
 import importlib
 import os
-import pkgutil
-import re
 import textwrap
 from collections.abc import Mapping, Sequence
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-import icha.figures
+from icha.datasets.results import figure_number
 from icha.figures.captions import caption_of, count_runs, sentence_on_loops, sentence_on_measurements, texts_of
-from icha.figures.declaration import Declaration
-from icha.figures.own_figure import caption_in
 from icha.figures.style import GREY, in_style, new_figure, save
 from icha.support.atomic_files import whole_file
+from icha.support.scripts import caption_in
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-_NUMBERED = re.compile(r"fig(\d+)_")
-
-
-def figure_number(name: str) -> int | None:
-    """Return the number in the name of a figure; None for a figure of the user's own."""
-    numbered = _NUMBERED.match(name)
-    return numbered and int(numbered[1])
 
 
 def module_name(name: str) -> str:
@@ -41,17 +32,6 @@ def module_name(name: str) -> str:
 def figure_module(name: str) -> ModuleType:
     """Import the module of a figure and return it."""
     return importlib.import_module(module_name(name))
-
-
-def declaration_of(name: str) -> Declaration:
-    """Return the declaration of a figure."""
-    return figure_module(name).DECLARATION
-
-
-_MODULES = (module.name for module in pkgutil.iter_modules(icha.figures.__path__))
-_NAMES = sorted(filter(_NUMBERED.match, _MODULES), key=figure_number)
-# Declarations by the name of the figure, in the order of the numbers.
-DECLARATIONS: dict[str, Declaration] = {name: declaration_of(name) for name in _NAMES}
 
 
 def draw_figure(

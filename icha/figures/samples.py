@@ -2,40 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from pydantic import Field
 
 from icha.contact.models import MODELS
-from icha.datasets import results
 from icha.datasets.quantities import quantity, state_words, symbol_of
-from icha.figures.declaration import Campaign, Inputs, StudyFigure
 from icha.support.formatting import choose_unit
-from icha.support.values import Problem
 
 if TYPE_CHECKING:
     import xarray as xr
-
-
-class SampleFigure(StudyFigure):
-    """A figure of the sampled cases of a study."""
-
-    target: int = Field(default=-1, ge=-1, description="Number of the target, from 0. Default (-1): the last target.")
-
-    def study_problems(self, campaign: Campaign, study) -> Iterator[Problem]:
-        """Yield a problem if the study has no `sample`, or not this target."""
-        if study.sample is None:
-            yield ("study",), self.study, "has no sampled cases; expected a study with `sample`"
-        last = len(study.targets.states) - 1
-        if self.target > last:
-            yield ("target",), self.target, f"is not the number of a target; expected -1, 0, … {last}"
-
-
-def sample_inputs(campaign: Campaign, options: SampleFigure, files: results.ResultFiles) -> Inputs:
-    """Return the path of the file of sampled cases."""
-    return {"sensitivity": files.path(results.SENSITIVITY)}
 
 
 def responses(data: xr.Dataset, target: int) -> xr.Dataset:

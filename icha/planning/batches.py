@@ -12,7 +12,7 @@ from typing import NamedTuple, TypeVar
 
 from icha.configuration.campaign import Campaign
 from icha.datasets.labels import RunLabels
-from icha.figures.registry import figure_number
+from icha.datasets.results import figure_number
 from icha.planning import costs
 from icha.planning.requirements import is_resumable, run_threads, surface_threads
 from icha.planning.run_costs import run_costs

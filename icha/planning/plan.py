@@ -13,7 +13,6 @@ from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets.attributes import why_failed
 from icha.datasets.stamp import difference, read_stamp
 from icha.datasets.variables.campaign import STATUS_ATTRIBUTES
-from icha.figures.registry import declaration_of
 from icha.planning import costs
 from icha.planning.measured_times import correct_costs
 from icha.planning.requirements import largest_grid, run_threads, surface_threads
@@ -157,8 +156,8 @@ def _analysis(campaign: Campaign, results: Path, computed: list[Item]) -> Iterat
     for path, size in sizes.items():
         yield item(ANALYSIS, path, costs.analysis_cost(size, values), 1 / len(sizes))
     pictures = (path for path in files.figures if path.endswith("png"))
-    for path, name in zip(pictures, campaign.figures.by_name(), strict=True):
-        nodes = largest_grid(campaign) ** 2 if declaration_of(name).holds_topography else 0
+    for path, request in zip(pictures, campaign.figures.by_name().values(), strict=True):
+        nodes = largest_grid(campaign) ** 2 if request.holds_topography else 0
         yield item(FIGURES, path, costs.figure_cost(values, nodes))
     yield item(REPORT, files.report, costs.analysis_cost(700e3 + 80e3 * len(files.figures), values))
 

@@ -20,7 +20,7 @@ from icha.analysis.sample_words import distribution_words, left_out_lines, sampl
 from icha.analysis.validity import statements_on_dataset
 from icha.checks.findings import Check
 from icha.contact.models import MODEL_PAPER
-from icha.figures.registry import figure_number
+from icha.datasets.results import figure_number
 from icha.report.spectra import picture_of_spectra
 from icha.report.tables import (
     answers_table,

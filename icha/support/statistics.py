@@ -52,7 +52,7 @@ def ensemble(samples, axis: int = 0) -> Ensemble:
     The confidence interval of n members with standard deviation s is mean ± t s/√n. Here t is the 97.5 % quantile of
     Student's distribution with n - 1 degrees of freedom (Student, Biometrika 6 (1908) 1).
     """
-    from scipy.special import stdtrit  # imported here because declarations of figures do not need it
+    from scipy.special import stdtrit  # imported here because it loads slowly
 
     samples = np.moveaxis(np.asarray(samples, float), axis, 0)
     known = np.isfinite(samples)

@@ -5,8 +5,8 @@ import math
 import pytest
 
 from icha.configuration.cases import run_cases, run_settings, surface_cases, surface_settings
+from icha.configuration.figures import TheoryFigure
 from icha.datasets.results import ResultFiles
-from icha.figures import fig2_area_and_gap, fig7_stiffness
 from icha.planning.results import campaign_files
 from icha.surfaces.shapes import Cone, CylinderPunch, FlatPunch, Paraboloid, Sphere, Wave
 
@@ -33,9 +33,8 @@ def test_theories_of_rough_contact_are_only_for_surfaces_without_a_shape(load):
         changes = {"surfaces.ball": BALL, "studies.one.surfaces": surfaces, "studies.one.models": ["boundary_elements"]}
         campaign = load(changes).campaign
         assert list(campaign_files(campaign).theories.values()) == ["rough"]
-        for module in (fig2_area_and_gap, fig7_stiffness):
-            options = module.DECLARATION.options(study="one")
-            assert module.DECLARATION.inputs(campaign, options, ResultFiles(campaign.name)).keys() == inputs
+        request = TheoryFigure(study="one")
+        assert request.inputs(campaign, ResultFiles(campaign.name)).keys() == inputs
 
 
 def test_rough_surfaces_beside_smooth_ones_need_slopes(refused):

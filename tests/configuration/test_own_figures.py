@@ -6,10 +6,11 @@ import sys
 import pytest
 import small_campaign as small
 
+from icha.configuration.figures import OwnFigure
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import write_dataset
-from icha.figures.own_figure import OwnFigure, modules_of
 from icha.figures.registry import draw_figure
+from icha.support.scripts import modules_of
 
 AREAS = '''
 import matplotlib.pyplot as plt

@@ -16,6 +16,7 @@ from conftest import FIGURES, REPOSITORY, SMOKE, snakemake
 from traces import traces
 
 from icha.configuration.cases import campaign_sha256
+from icha.configuration.figures import Figures
 from icha.configuration.load import load_configuration
 from icha.support.checksums import changed_files
 
@@ -123,7 +124,7 @@ def test_the_campaigns_of_the_tests_have_every_figure():
     campaign = load_configuration(REPOSITORY / SMOKE).campaign
     indenter = load_configuration(REPOSITORY / "config/campaigns/indenter.yaml").campaign
     drawn = {*campaign.figures.by_name(), *indenter.figures.by_name()}
-    assert drawn == {file.stem for file in (REPOSITORY / "icha/figures").glob("fig*.py")}
+    assert drawn == Figures.model_fields.keys()
 
 
 def test_a_wrong_configuration_is_a_message_without_traceback(smoke, tmp_path):

@@ -1,18 +1,16 @@
-# figures/<name>.png, .pdf and .txt, the caption. A figure depends on the data, on its options and on its code. The module of a figure
-# declares the inputs and the arguments (icha/figures/fig*.py). One job draws a batch of figures.
+# figures/<name>.png, .pdf and .txt, the caption. A figure depends on the data, on its options and on its code. Its request
+# names the inputs and the arguments (icha/configuration/figures.py). One job draws a batch of figures.
 
+from icha.configuration.figures import drawing
 from icha.datasets.results import FIGURE, FIGURE_ENDINGS, ResultFiles
-from icha.figures.own_figure import modules_of
-from icha.figures.registry import declaration_of, module_name
+from icha.figures.registry import module_name
 from icha.planning.batches import figure_batches
 from icha.planning.requirements import figure_memory
+from icha.support.scripts import modules_of
 
 FIGURES = CAMPAIGN.figures.by_name()
-# Input files of each figure. The keys are the arguments of the function that draws the figure.
-FIGURE_INPUTS = {
-    name: declaration_of(name).inputs(CAMPAIGN, options, ResultFiles(CAMPAIGN.name, RESULTS))
-    for name, options in FIGURES.items()
-}
+# Arguments of `icha.figures.registry.draw_figure` for each figure, without the paths of its files.
+DRAWINGS = {name: drawing(CAMPAIGN, name, ResultFiles(CAMPAIGN.name, RESULTS)) for name in FIGURES}
 
 
 def figure_files(name):
@@ -25,29 +23,17 @@ def figure_files(name):
 
 def input_files(name):
     """Return the input files of a figure."""
-    return [file for given in FIGURE_INPUTS[name].values() for file in ([given] if isinstance(given, str) else given)]
+    return [file for given in DRAWINGS[name]["inputs"].values() for file in ([given] if isinstance(given, str) else given)]
 
 
 def given_files(name):
     """Return the files of the user that a figure needs: tables of measurements, or a script with its modules."""
-    scripts = [FIGURE_INPUTS[name]["script"]] if "script" in FIGURE_INPUTS[name] else []
-    return [
-        *FIGURE_INPUTS[name].get("tables", ()),
-        *scripts,
-        *(file for script in scripts for file in modules_of(script)),
-    ]
-
-
-def drawing(name):
-    """Return the arguments of `icha.figures.registry.draw_figure` for a figure, without the paths of its files."""
-    options = FIGURES[name]
-    arguments, studies = options.arguments(CAMPAIGN), options.studies_of(CAMPAIGN)
-    return {"name": name, "inputs": FIGURE_INPUTS[name], "arguments": arguments, "studies": studies}
+    inputs = DRAWINGS[name]["inputs"]
+    scripts = [inputs["script"]] if "script" in inputs else []
+    return [*inputs.get("tables", ()), *scripts, *(file for script in scripts for file in modules_of(script))]
 
 
 for number, names in enumerate(figure_batches(FIGURES)):
-    declarations = [declaration_of(name) for name in names]
-
     rule:
         name:
             f"draw_figures_{number}"
@@ -63,10 +49,10 @@ for number, names in enumerate(figure_batches(FIGURES)):
         conda:
             "../envs/icha.yaml"
         resources:
-            mem_mb=max(figure_memory(CAMPAIGN, holds_topography=each.holds_topography) for each in declarations),
+            mem_mb=max(figure_memory(CAMPAIGN, holds_topography=FIGURES[name].holds_topography) for name in names),
             runtime=10,
         params:
-            figures=as_it_is(LongList(drawing(name) for name in names)),
+            figures=as_it_is(LongList(DRAWINGS[name] for name in names)),
             # These files are compared by content, not by time.
             sha256=as_it_is([sha256_of(Path(file)) for name in names for file in given_files(name)]),
             code=code_of("draw_figures.py", *map(module_name, names)),
