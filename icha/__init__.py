@@ -14,6 +14,7 @@ _HOME = {
     "simulate": "simulation",
     **dict.fromkeys(("plot_area", "plot_contact", "plot_separation"), "figures.quick"),
     "ConvergenceError": "simulation",
+    "fetch_deposit": "deposit.fetch",
     "IchaWarning": "support.usual",
 }
 __all__ = ["__version__", *_HOME]
@@ -21,6 +22,7 @@ __all__ = ["__version__", *_HOME]
 if TYPE_CHECKING:  # for editors and type checkers only
     from icha.asperity.material import Material as Material
     from icha.configuration.topographies import read_scan as read_scan
+    from icha.deposit.fetch import fetch_deposit as fetch_deposit
     from icha.figures.quick import plot_area as plot_area
     from icha.figures.quick import plot_contact as plot_contact
     from icha.figures.quick import plot_separation as plot_separation

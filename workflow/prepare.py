@@ -13,7 +13,6 @@ from snakemake.logging import logger
 from icha.configuration.errors import ConfigurationError
 from icha.configuration.load import Configuration, load_configuration
 from icha.datasets.stamp import Stamp, outdated
-from icha.deposit.program import note_versions
 from icha.planning.ownership import claim, find_conflict
 from icha.support.atomic_files import is_left_over, probe_folder
 from icha.support.formatting import format_count, printable, printable_lines
@@ -116,7 +115,6 @@ class Results:
                     raise reason
         self.remove_left_over()
         claim(self.folder, self._origin)
-        note_versions(self.folder)
 
     def remove_left_over(self) -> None:
         """Remove temporary files of killed programs from the results; without the lock, they may be in use."""

@@ -8,27 +8,22 @@ from icha.deposit.metadata import licence_problem
 from icha.deposit.program import Source, program_source, refuse_other_environment
 
 
-def publishable_source(configuration: Configuration, project: str, results: str) -> Source:
+def publishable_source(configuration: Configuration, project: str) -> Source:
     """Return the source code that a deposit will contain.
 
     Raises
     ------
     SystemExit
-        If metadata are missing, if the source code is not committed, or if the versions of packages differ from the
-        locked versions, either now or at the time when a result was made.
+        If metadata are missing, or if the versions of packages differ from the locked versions.
     """
     campaign = configuration.campaign
     problems = [f"{configuration.origin}: {line}" for line in missing_metadata(campaign.deposit_metadata())]
     if problem := licence_problem(campaign):
         problems.append(": ".join([configuration.origin, *problem]))
     try:
-        source = program_source(project)
-    except ValueError as error:
-        problems.append(str(error))
-    try:
-        refuse_other_environment(Path(project), Path(results))
+        refuse_other_environment(Path(project))
     except ValueError as error:
         problems.append(str(error))
     if problems:
         raise SystemExit("\n".join(["The campaign cannot be published:", *problems]))
-    return source
+    return program_source(project)

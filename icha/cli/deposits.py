@@ -14,7 +14,7 @@ from typing import Annotated
 import typer
 from typer import confirm
 
-from icha.cli.project import FAILED, Cores, Large, UserError, echo, option, shorten_path
+from icha.cli.project import FAILED, Cores, UserError, echo, option, shorten_path
 from icha.cli.run import run
 from icha.support import formatting
 from icha.support.formatting import format_count, printable
@@ -25,7 +25,7 @@ MOST_PROBLEMS = 100  # largest number of problems that are printed for a damaged
 Deposit = Annotated[Path, typer.Argument(help="Folder of a deposit, or its zip.", show_default=False)]
 
 
-def verify(deposit: Deposit, large: Large = False) -> None:
+def verify(deposit: Deposit) -> None:
     """Verify that a deposit contains all its files with the right checksums, and no other files.
 
     The command also reports file names that lead outside the deposit, links, devices, and a zip whose content is far
@@ -35,7 +35,7 @@ def verify(deposit: Deposit, large: Large = False) -> None:
     problems), 2 if the file or folder does not exist.
     """
     try:
-        with _intact(deposit, large) as folder:
+        with _intact(deposit) as folder:
             echo(f"{printable(deposit)}: intact: {_contents(folder)}")
     except _Damaged as damaged:
         echo(damaged, err=True, fg="red")
@@ -47,14 +47,14 @@ class _Damaged(UserError):
 
 
 @contextlib.contextmanager
-def _intact(deposit: Path, large: bool) -> Iterator[Path]:
+def _intact(deposit: Path) -> Iterator[Path]:
     """Verify a deposit and yield its folder; a zip is first unpacked into a temporary folder."""
     from icha.deposit.verify import DamagedDeposit, whole_deposit
 
     if not deposit.exists():
         raise UserError(f"{deposit}: no such file or folder; expected the folder of a deposit, or its zip")
     try:
-        with whole_deposit(deposit, large=large) as folder:
+        with whole_deposit(deposit) as folder:
             yield folder
     except DamagedDeposit as damaged:
         problems = damaged.args
@@ -88,7 +88,6 @@ def reproduce(
         ),
     ] = None,
     cores: Cores = None,
-    large: Large = False,
 ) -> None:
     """Compute the results of a deposit again and compare every number with the published number.
 
@@ -106,7 +105,7 @@ def reproduce(
     target = None if folder is None else folder.resolve()
     keep = folder is not None
     try:
-        with _intact(deposit, large) as original:
+        with _intact(deposit) as original:
             name = campaign_name(original)
             runs = find_runs(only or (), original)
             _introduce(deposit, original, folder)
@@ -191,15 +190,8 @@ def upload(
     url: Annotated[
         str, typer.Option(help="Server with Zenodo's deposit API, such as sandbox.zenodo.org for tests.")
     ] = "https://zenodo.org",
-    draft: Annotated[
-        int | None,
-        option(
-            "Continue this draft, for example after a failed upload; files that are complete are not sent again.",
-            metavar="ID",
-        ),
-    ] = None,
+    draft: Annotated[int | None, option("Send the deposit to this draft, not to a new one.", metavar="ID")] = None,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask for confirmation.")] = False,
-    large: Large = False,
 ) -> None:
     """Send a deposit to Zenodo as a draft, after your confirmation.
 
@@ -210,7 +202,7 @@ def upload(
 
     Exit status: 0 if all files were sent, 1 if not all files were sent, 2 if the deposit cannot be sent.
     """
-    from icha.deposit.metadata import read_zenodo_metadata, summary_of
+    from icha.deposit.metadata import read_zenodo_metadata
     from icha.deposit.upload import Zenodo, server_address
     from icha.deposit.verify import CRATE, README
 
@@ -218,7 +210,7 @@ def upload(
     try:
         address = server_address(url)
         server = Zenodo(address, _token(address))
-        with _intact(archive, large) as folder:
+        with _intact(archive) as folder:
             metadata = read_zenodo_metadata(folder)
             # Zenodo reserves a DOI of this form for one draft, and the deposit contains this DOI.
             reserved = re.fullmatch(r"10\.\d+/zenodo\.(\d+)", str(metadata.get("doi")))
@@ -228,11 +220,12 @@ def upload(
                     f"--draft {reserved[1]}, or make the deposit without publication.doi"
                 )
             files = [archive, folder / README, folder / CRATE]
-            rows = {"to": f"{address}, {f'draft {draft}' if draft else 'new draft'}", **summary_of(metadata)}
+            echo(f"to: {address}, {f'draft {draft}' if draft else 'new draft'}")
+            for key in ("title", "version", "license", "creators", "communities"):
+                echo(f"{key}: {_summary(metadata.get(key))}")
             for path in files:
                 size = path.stat().st_size
-                rows[path.name] = f"{formatting.size(size)} ({size:,} bytes)"
-            echo("\n".join(f"{name + ':':<11}{printable(value or 'none')}" for name, value in rows.items()))
+                echo(f"{printable(path.name)}: {formatting.size(size)} ({size:,} bytes)")
             if not yes and not sys.stdin.isatty():
                 raise UserError("cannot ask for confirmation without a terminal; nothing was sent. Use --yes")
             if not yes and not confirm("Send the deposit?"):
@@ -241,6 +234,12 @@ def upload(
             _send(server, files, metadata, draft)
     except ValueError as error:
         raise UserError(str(error)) from None
+
+
+def _summary(value: object) -> str:
+    """Return a value of the metadata of a deposit of unknown origin as a line of text."""
+    names = [each.get("name", each.get("identifier")) if isinstance(each, dict) else each for each in value or ()]
+    return printable("; ".join(map(str, names)) if isinstance(value, list) else value or "none")
 
 
 def _token(address: str) -> str:
@@ -256,30 +255,19 @@ def _token(address: str) -> str:
 
 def _send(server, files, metadata, number) -> None:
     """Send files and metadata to a draft at Zenodo; if sending fails, print how to continue the draft."""
-    from icha.deposit.upload import ZENODO, ZenodoError, md5_of
+    from icha.deposit.upload import ZENODO, ZenodoError
 
     draft = None
     try:
-        draft = server.draft(str(number)) if number else server.create()
-        echo(f"draft:     {draft.page}")
-        sums = {path.name: md5_of(path) for path in files}
-        unchanged = {name for name, (_, md5) in draft.files.items() if md5 == sums.get(name)}
-        for name in set(draft.files) - unchanged:
-            if name in sums:
-                server.remove(draft, name)
-            else:
-                echo(f"{name}: is in the draft but not in the deposit; the file remains unchanged")
+        draft = server.draft(number) if number else server.create()
         # Metadata are sent before the files because the server reports errors in metadata at once.
         server.describe(draft, metadata)
         for path in files:
-            if path.name in unchanged:
-                echo(f"{path.name}: already sent")
-                continue
-            arrived = server.upload(draft, path, sums[path.name])
-            echo(f"{path.name}: sent, {'checksum confirmed' if arrived else 'the server returned no checksum'}")
-        if draft.doi:
-            echo(f"DOI:       {draft.doi} (reserved)")
-        echo("The deposit is a draft. Inspect and publish the draft on its page.")
+            confirmed = "checksum confirmed" if server.upload(draft, path) else "no checksum from the server"
+            echo(
+                f"{printable(path.name)}: sent, {'checksum confirmed' if confirmed else 'no checksum from the server'}"
+            )
+        echo(f"{printable(draft.page)} is a draft. Inspect and publish the draft on this page.")
     except (ZenodoError, OSError, KeyboardInterrupt) as error:
         with contextlib.suppress(OSError):
             echo(f"Error: {'stopped' if isinstance(error, KeyboardInterrupt) else error}", err=True, fg="red")
@@ -287,7 +275,7 @@ def _send(server, files, metadata, number) -> None:
             server_option = "" if server.address == ZENODO else f" --url {server.address}"
             echo(
                 f"A draft remains: {draft.page}\n"
-                f"To continue:     icha upload {shorten_path(files[0])}{server_option} --draft {draft.number}",
+                f"To send again:   icha upload {shorten_path(files[0])}{server_option} --draft {draft.number}",
                 err=True,
             )
         raise typer.Exit(FAILED) from None

@@ -31,7 +31,6 @@ Config = Annotated[
     str | None,
     typer.Argument(help="Configuration file, or name of a campaign. Default: config/config.yaml.", show_default=False),
 ]
-Large = Annotated[bool, typer.Option("--large", help="Accept a deposit with very many or very large files.")]
 Cores = Annotated[int | None, option("Number of cores to use. Default: 2.", "--cores", "-c", min=1, max=999_999)]
 Folder = Annotated[
     Path | None,

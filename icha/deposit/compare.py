@@ -19,7 +19,7 @@ prints a remark, and the results still count as reproduced.
 
 import os
 import textwrap
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -30,21 +30,20 @@ import numpy as np
 from icha.checks.run import FRONT_LIMIT, RESIDUAL_LIMIT
 from icha.deposit.verify import COMPUTED, files_of
 from icha.support.checksums import sha256_of
-from icha.support.formatting import printable
+from icha.support.formatting import format_count, printable
 from icha.support.input_files import refuse_traps
 
-VERDICTS = ("identical", "within tolerance", "different", "missing", "extra")
-IDENTICAL, WITHIN, DIFFERENT, MISSING, EXTRA = VERDICTS
+IDENTICAL, WITHIN, DIFFERENT = "identical", "within tolerance", "different"
 TOLERANCE = 1e-6
 FLOOR = 1e-6
 # Largest absolute differences that are within tolerance, by the name of the variable.
 NOISE = {"residual": RESIDUAL_LIMIT, "gap_residual": RESIDUAL_LIMIT, "front_residual": FRONT_LIMIT}
-# Endings of the names of files that are made from the data. Differences between these files count only as remarks.
+# Endings of the names of files that are drawn or written from the data. Their differences count only as remarks.
 _DERIVED = (".png", ".pdf", ".html", "checks.json")
 # Largest number of variables that the text of a comparison lists.
 _MOST_LINES = 20
-# Largest number of characters of an error, and of a value, in a message.
-_LONGEST_ERROR, _LONGEST_VALUE = 300, 60
+# Largest number of characters of an error or a value in a message.
+_LONGEST = 100
 
 
 class Difference(NamedTuple):
@@ -52,54 +51,37 @@ class Difference(NamedTuple):
 
     Attributes
     ----------
+    path : path of the file.
     name : name of the variable, group or dimension that differs; "" if the file as a whole differs.
-    verdict : one of `VERDICTS` except `identical`.
+    verdict : `WITHIN` or `DIFFERENT`.
     detail : description of the difference; first the value in the deposit, then the value in the rerun.
     deviation : largest relative difference of the numbers; infinite if something else differs.
     """
 
+    path: str
     name: str
     verdict: str
     detail: str
     deviation: float = np.inf
 
+    @property
+    def is_remark(self) -> bool:
+        """True if the file only shows results of other files, like a figure, and both folders have the file."""
+        return self.path.endswith(_DERIVED) and not self.detail.startswith("only in")
 
-class File(NamedTuple):
-    """A file of the results, and its differences between deposit and rerun."""
 
-    path: str
+class Comparison(NamedTuple):
+    """Paths of all compared files, and their differences."""
+
+    files: tuple[str, ...]
     differences: tuple[Difference, ...]
 
     @property
     def verdict(self) -> str:
-        """Verdict on the whole file, one of `VERDICTS`."""
-        verdicts = {each.verdict for each in self.differences}
-        if self.differences and not self.differences[0].name:
-            return self.differences[0].verdict
-        return DIFFERENT if verdicts - {WITHIN} else WITHIN if verdicts else IDENTICAL
-
-    @property
-    def kind(self) -> str:
-        """First folder in the path of the file, such as `runs`."""
-        return self.path.partition("/")[0]
-
-    @property
-    def is_remark(self) -> bool:
-        """True if the file only shows results of other files, like a figure, and differs from the file of the rerun."""
-        return self.verdict == DIFFERENT and self.path.endswith(_DERIVED)
-
-
-class Comparison(NamedTuple):
-    """Comparison of all files of a deposit with those of a rerun, sorted by path."""
-
-    files: tuple[File, ...]
-
-    @property
-    def verdict(self) -> str:
-        """Verdict on all files: `identical`, `within tolerance` or `different`; remarks do not count."""
-        if any(file.verdict in (DIFFERENT, MISSING, EXTRA) and not file.is_remark for file in self.files):
+        """Verdict on all files: `IDENTICAL`, `WITHIN` or `DIFFERENT`; remarks do not count as different."""
+        if any(each.verdict == DIFFERENT and not each.is_remark for each in self.differences):
             return DIFFERENT
-        return IDENTICAL if all(file.verdict == IDENTICAL for file in self.files) else WITHIN
+        return WITHIN if self.differences else IDENTICAL
 
 
 def compare_folders(
@@ -115,49 +97,38 @@ def compare_folders(
     deposit, rerun = Path(deposit), Path(rerun)
     if paths is None:
         paths = {path for folder in (deposit, rerun) for path in files_of(folder) if path.split("/")[0] in COMPUTED}
-    return Comparison(tuple(_compare_files(deposit / path, rerun / path, path) for path in sorted(paths)))
+    files, differences = tuple(sorted(paths)), []
+    for path in files:
+        try:
+            differences += [Difference(path, *each) for each in _compare_files(deposit / path, rerun / path)]
+        except Exception as error:  # a file of unknown origin may cause any error
+            reason = textwrap.shorten(repr(error), _LONGEST, placeholder=" …")
+            differences.append(Difference(path, "", DIFFERENT, f"cannot be compared: {reason}"))
+    return Comparison(files, tuple(differences))
 
 
-def _compare_files(deposit: Path, rerun: Path, path: str) -> File:
-    """Compare a file in two folders; a file that cannot be read counts as different."""
-    try:
-        return File(path, tuple(_differences(deposit, rerun)))
-    except Exception as error:  # a file of unknown origin may cause any error
-        reason = textwrap.shorten(repr(error), _LONGEST_ERROR, placeholder=" …")
-        return File(path, (Difference("", DIFFERENT, f"cannot be compared: {reason}"),))
-
-
-def _differences(deposit: Path, rerun: Path) -> Iterator[Difference]:
-    if not deposit.is_file():
-        yield Difference("", EXTRA, "the deposit has no such file")
-    elif not rerun.is_file():
-        yield Difference("", MISSING, "the rerun has no such file")
+def _compare_files(deposit: Path, rerun: Path) -> Iterator[tuple]:
+    """Yield the fields of the differences between two files, without the path."""
+    if not deposit.is_file() or not rerun.is_file():
+        yield "", DIFFERENT, f"only in the {'rerun' if rerun.is_file() else 'deposit'}"
     elif sha256_of(deposit) == sha256_of(rerun):
         return
     elif deposit.suffix == ".nc":
         for file in (deposit, rerun):
             refuse_traps(file)
         with netCDF4.Dataset(deposit) as a, netCDF4.Dataset(rerun) as b:
-            yield from _compare_groups(a, b, "")
+            for each in _paired(dict(_members(a)), dict(_members(b))):
+                yield from _compare_members(*each)
     else:
-        yield Difference("", DIFFERENT, "the bytes differ")
+        yield "", DIFFERENT, "the bytes differ"
 
 
-def _compare_groups(a: netCDF4.Dataset, b: netCDF4.Dataset, path: str) -> Iterator[Difference]:
-    """Yield the differences between two groups of netCDF files, including the groups inside them."""
-    yield from _compare_attributes(a, b, f"{path}/ (attributes)")
-    sizes_a, sizes_b = ({name: len(dim) for name, dim in group.dimensions.items()} for group in (a, b))
-    for name, size, other in _paired(sizes_a, sizes_b):
-        if size != other:
-            yield Difference(f"{path}/{name} (dimension)", DIFFERENT, f"size: {size} and {other}")
-    for compare, members, kind in ((_compare_variables, "variables", ""), (_compare_groups, "groups", " (group)")):
-        for name, one, other in _paired(getattr(a, members), getattr(b, members)):
-            if one is None:
-                yield Difference(f"{path}/{name}{kind}", EXTRA, "only in the rerun")
-            elif other is None:
-                yield Difference(f"{path}/{name}{kind}", MISSING, "only in the deposit")
-            else:
-                yield from compare(one, other, f"{path}/{name}")
+def _members(group: netCDF4.Dataset, path: str = "") -> Iterator[tuple[str, netCDF4.Dataset | netCDF4.Variable]]:
+    """Yield a group of a netCDF file, its variables, and the same for all groups inside, with their paths."""
+    yield f"{path}/ (group)", group
+    yield from ((f"{path}/{name}", variable) for name, variable in group.variables.items())
+    for name, inner in group.groups.items():
+        yield from _members(inner, f"{path}/{name}")
 
 
 def _paired(a: Mapping, b: Mapping) -> Iterator[tuple]:
@@ -165,17 +136,22 @@ def _paired(a: Mapping, b: Mapping) -> Iterator[tuple]:
     return ((key, a.get(key), b.get(key)) for key in dict.fromkeys([*a, *b]))
 
 
-def _compare_variables(a: netCDF4.Variable, b: netCDF4.Variable, name: str) -> Iterator[Difference]:
-    for quantity in ("dtype", "dimensions", "shape"):
-        one, other = getattr(a, quantity), getattr(b, quantity)
-        if one != other:
-            yield Difference(name, DIFFERENT, f"{quantity}: {_shown(one)} and {_shown(other)}")
-            return
-    noise = NOISE.get(name.rpartition("/")[2], 0.0)
-    found = compare_values(_values(a), _values(b), noise=noise)
-    if found:
-        yield found._replace(name=name)
-    yield from _compare_attributes(a, b, name)
+def _compare_members(name: str, a, b) -> Iterator[tuple]:
+    """Compare two variables or groups with the same path; None stands for a missing one."""
+    if a is None or b is None:
+        yield name, DIFFERENT, f"only in the {'rerun' if a is None else 'deposit'}"
+        return
+    if isinstance(a, netCDF4.Variable):
+        for quantity in ("dtype", "dimensions", "shape"):
+            one, other = getattr(a, quantity), getattr(b, quantity)
+            if one != other:
+                yield name, DIFFERENT, f"{quantity}: {_shown(one)} and {_shown(other)}"
+                return
+        if found := compare_values(_values(a), _values(b), noise=NOISE.get(name.rpartition("/")[2], 0.0)):
+            yield name, *found
+    for key, one, other in _paired(*({key: each.getncattr(key) for key in each.ncattrs()} for each in (a, b))):
+        if type(one) is not type(other) or not np.array_equal(one, other):
+            yield name, DIFFERENT, f"attribute {key}: {_shown(one)} and {_shown(other)}"
 
 
 def _values(variable: netCDF4.Variable) -> np.ndarray:
@@ -188,28 +164,27 @@ def _values(variable: netCDF4.Variable) -> np.ndarray:
     return values
 
 
-def _compare_attributes(a, b, name: str) -> Iterator[Difference]:
-    for key, one, other in _paired(*({key: each.getncattr(key) for key in each.ncattrs()} for each in (a, b))):
-        if type(one) is not type(other) or not np.array_equal(one, other):
-            yield Difference(name, DIFFERENT, f"attribute {key}: {_shown(one)} and {_shown(other)}")
-
-
-def compare_values(a: np.ndarray, b: np.ndarray, *, noise: float = 0.0) -> Difference | None:
-    """Compare two arrays of the same shape and type; return the difference, or None if the arrays are identical.
+def compare_values(a: np.ndarray, b: np.ndarray, *, noise: float = 0.0) -> tuple[str, str, float] | None:
+    """Compare two arrays of the same shape and type.
 
     Parameters
     ----------
     a, b : values in the deposit and in the rerun; NaN stands for a missing value.
     noise : largest absolute difference that is within tolerance for values of any size.
+
+    Returns
+    -------
+    Verdict, description and largest relative deviation of the difference; None if the arrays are identical.
     """
-    if a.dtype.kind != "f":
-        unequal = np.asarray(a != b)
-        return Difference("", DIFFERENT, f"not equal: {_places(a, b, unequal)}") if unequal.any() else None
-    missing = np.isnan(a)
-    if (missing != np.isnan(b)).any():
-        return Difference("", DIFFERENT, f"missing in other places: {_places(a, b, missing != np.isnan(b))}")
-    if np.array_equal(a, b, equal_nan=True):
+    is_number = a.dtype.kind == "f"
+    unequal = np.isnan(a) != np.isnan(b) if is_number else np.asarray(a != b)
+    if unequal.any():
+        text = "missing in other places" if is_number else "not equal"
+        count = f"{np.count_nonzero(unequal)} of {unequal.size}"
+        return DIFFERENT, f"{text}: {count}, first {_place(a, b, np.argmax(unequal))}", np.inf
+    if not is_number or np.array_equal(a, b, equal_nan=True):
         return None
+    missing = np.isnan(a)
     size = np.where(missing, 0.0, np.maximum(abs(a), abs(b)))
     largest = np.max(size, where=np.isfinite(size), initial=0.0)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
@@ -219,13 +194,8 @@ def compare_values(a: np.ndarray, b: np.ndarray, *, noise: float = 0.0) -> Diffe
     most = float(deviation.max())
     detail = f"largest relative deviation {most:.2g}, {_place(a, b, np.argmax(deviation))}"
     if most <= TOLERANCE:
-        return Difference("", WITHIN, detail, most)
-    count = np.count_nonzero(deviation > TOLERANCE)
-    return Difference("", DIFFERENT, f"{detail}; {count} of {deviation.size} values", most)
-
-
-def _places(a: np.ndarray, b: np.ndarray, where: np.ndarray) -> str:
-    return f"{np.count_nonzero(where)} of {where.size}, first {_place(a, b, np.argmax(where))}"
+        return WITHIN, detail, most
+    return DIFFERENT, f"{detail}; {np.count_nonzero(deviation > TOLERANCE)} of {deviation.size} values", most
 
 
 def _place(a: np.ndarray, b: np.ndarray, position: int) -> str:
@@ -235,44 +205,28 @@ def _place(a: np.ndarray, b: np.ndarray, position: int) -> str:
 
 def _shown(value: object) -> str:
     value = value.item() if isinstance(value, np.ndarray | np.generic) and value.size == 1 else value
-    return textwrap.shorten(repr(value), _LONGEST_VALUE, placeholder=" …")
+    return textwrap.shorten(repr(value), _LONGEST, placeholder=" …")
 
 
 def format_comparison(comparison: Comparison) -> str:
-    """Return the comparison as text, with one line for each kind of file, and for each variable that is not identical.
+    """Return the comparison as text, with one line for each variable that is not identical, the largest first.
 
-    The largest deviations come first. The text lists at most `_MOST_LINES` variables that differ, and at most
-    `_MOST_LINES` variables within tolerance.
+    The text lists at most `_MOST_LINES` variables that differ, and at most `_MOST_LINES` variables within tolerance.
     """
-    kinds = sorted({file.kind for file in comparison.files}, key=COMPUTED.index)
-    width = max(map(len, kinds), default=0)
-    verdicts = [each for each in VERDICTS if any(file.verdict == each for file in comparison.files)]
-    text = [" ".join([" " * width, "  files", *(f" {each}" for each in verdicts)])]
-    for kind in kinds:
-        counts = Counter(file.verdict for file in comparison.files if file.kind == kind)
-        columns = [f" {counts[each] or '':>{len(each)}}" for each in verdicts]
-        text.append(" ".join([f"{kind:<{width}}", f"{counts.total():>7}", *columns]).rstrip())
-    for within in (False, True):
-        found = _lines(comparison, within)
-        text += [printable(line) for line in found[:_MOST_LINES]]
-        if len(found) > _MOST_LINES:
-            text.append(f"… and {len(found) - _MOST_LINES} more")
-    if any(file.is_remark for file in comparison.files):
+    grouped: dict[tuple[str, str], list[Difference]] = defaultdict(list)
+    for each in comparison.differences:
+        place = f"{each.path.split('/')[0]}: {each.name.lstrip('/')}" if each.name else each.path
+        grouped[each.verdict, place].append(each)
+    text = []
+    for verdict in (DIFFERENT, WITHIN):
+        found = [(max(group, key=lambda each: each.deviation), key, len(group)) for key, group in grouped.items()]
+        found = sorted((each for each in found if each[1][0] == verdict), key=lambda each: -each[0].deviation)
+        for worst, (_, place), count in found[:_MOST_LINES]:
+            files = worst.path if count == 1 else f"{count} files, the largest in {worst.path}"
+            text.append(printable(f"{place}: {verdict}, {worst.detail} ({files})"))
+        text += [f"… and {len(found) - _MOST_LINES} more"] if len(found) > _MOST_LINES else []
+    same = len(set(comparison.files) - {each.path for each in comparison.differences})
+    text.append(f"{format_count(same, 'file')} of {len(comparison.files)}: every variable is identical")
+    if any(each.is_remark for each in comparison.differences):
         text.append("Figures, pages and checks are made from the data; if only these files differ, nothing is wrong.")
     return "\n".join(text)
-
-
-def _lines(comparison: Comparison, within: bool) -> list[str]:
-    """Return one line for each unequal variable: those within tolerance if `within` is True, else the others."""
-    grouped = defaultdict(list)
-    for file in comparison.files:
-        for each in file.differences:
-            if (each.verdict == WITHIN) == within:
-                place = f"{file.kind}: {each.name.lstrip('/')}" if each.name else file.path
-                grouped[place, each.verdict].append((each.deviation, each.detail, file.path))
-    lines = []
-    for (place, verdict), found in grouped.items():
-        deviation, detail, path = max(found)
-        files = path if len(found) == 1 else f"{len(found)} files, the largest in {path}"
-        lines.append((-deviation, f"{place}: {verdict}, {detail}" + (f" ({files})" if place != path else "")))
-    return [line for _, line in sorted(lines)]

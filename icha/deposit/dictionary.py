@@ -1,4 +1,4 @@
-"""Write the data dictionary of a deposit, a table of all variables in the netCDF files with meanings and units."""
+"""Write the data dictionary of a deposit: all variables of netCDF files and all columns of CSV files, with units."""
 
 import csv
 import io
@@ -10,6 +10,7 @@ from pathlib import Path
 import netCDF4
 import numpy as np
 
+from icha.configuration.load import INPUTS
 from icha.datasets.results import RUN, SURFACE, THEORIES
 from icha.datasets.table import name_and_unit
 
@@ -22,17 +23,19 @@ _KINDS = [
     for pattern in (SURFACE, RUN, THEORIES)
     for folder in ("", "<model>/")
 ]
+_KINDS.append("figures/<name>.csv")
 
 
 def data_dictionary(folder: Path, files: Iterable[str]) -> str:
     """Return the text of `data_dictionary.csv`, with one row for each variable of each kind of file.
 
-    Columns of the table of all runs have the descriptions of the variables with the same names.
+    Files of one kind share their rows: `<name>` in a path stands for the part that differs. Columns of the table of all
+    runs have the descriptions of the variables with the same names.
 
     Parameters
     ----------
     folder : folder of the files.
-    files : paths of the files, relative to `folder`; other files than netCDF and the table are left out.
+    files : paths of the files, relative to `folder`; files other than netCDF and CSV are left out.
     """
     found: Counter[tuple[str, ...]] = Counter()
     long_names: dict[str, str] = {}
@@ -43,10 +46,12 @@ def data_dictionary(folder: Path, files: Iterable[str]) -> str:
                     for variable in group.variables.values():
                         found[file_pattern(name), group.path, *_described(variable)] += 1
                         long_names[variable.name] = getattr(variable, "long_name", "")
-        elif name.startswith("dataset/") and name.endswith(".csv"):
-            for column in (folder / name).open(encoding="utf-8").readline().strip().split(","):
-                variable, unit = name_and_unit(column)
-                found[name, "", column, "row", "", unit, long_names.get(variable, variable), "", "empty", ""] += 1
+        elif name.endswith(".csv") and not name.startswith(f"{INPUTS}/"):
+            with (folder / name).open(encoding="utf-8", newline="") as table:
+                for column in next(csv.reader(table), []):
+                    variable, unit = name_and_unit(column)
+                    row = column, "row", "", unit, long_names.get(variable, variable), "", "empty", ""
+                    found[file_pattern(name), "", *row] += 1
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows([_COLUMNS, *((*row, count) for row, count in found.items())])
     return text.getvalue()

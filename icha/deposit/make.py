@@ -8,7 +8,7 @@ import json
 import os
 import shutil
 import zipfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 
 import xarray as xr
@@ -16,18 +16,17 @@ import xarray as xr
 from icha.analysis.checks import read_checks, refuse_unknown_failures
 from icha.configuration.campaign import Campaign
 from icha.configuration.cases import campaign_sha256
-from icha.datasets.files import read_campaign
 from icha.datasets.stamp import read_stamp, refuse_outdated
-from icha.deposit.crate import Job, write_crate
+from icha.deposit.crate import write_crate
 from icha.deposit.dictionary import data_dictionary
-from icha.deposit.metadata import citation_cff, datacite_metadata, find_licence, zenodo_metadata
+from icha.deposit.metadata import citation_cff, zenodo_metadata
 from icha.deposit.program import Source
 from icha.deposit.readme import readme
-from icha.deposit.verify import CHECKSUMS, CRATE, README, SOURCE, ZENODO, files_of, problem_with_name
+from icha.deposit.verify import README, SOURCE, ZENODO, files_of, problem_with_name
 from icha.planning.costs import Cost
 from icha.planning.results import campaign_files, expected_stamps
 from icha.support.atomic_files import sync_folder, whole_file
-from icha.support.checksums import changed_files, sha256_of
+from icha.support.checksums import CHECKSUMS, changed_files, write_checksums
 
 _BLOCK = 2**20
 # All files in the zip have the earliest time that the format allows, so that the same files give the same zip.
@@ -44,7 +43,6 @@ def make_deposit(
     files: Iterable[str],
     campaign: Campaign,
     source: Source,
-    jobs: Sequence[Job],
     cost: Cost,
 ) -> None:
     """Write a deposit to `folder` and a zip of the deposit to `archive`; an earlier deposit is replaced at the end.
@@ -56,7 +54,6 @@ def make_deposit(
     files : paths of the published files in `results`: at least config.used.yaml, checks.json and the campaign dataset.
     campaign : configuration with complete metadata (`icha.configuration.publication.missing_metadata`).
     source : source of the program.
-    jobs : jobs that made the results.
     cost : expected time and memory for computing the campaign.
 
     Raises
@@ -73,16 +70,14 @@ def make_deposit(
         for file in files:
             (staging / file).parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(results / file, staging / file)
-            (staging / file).chmod(0o644)
         source.export(staging / SOURCE)
         if wrong := [f"  {file!r} {why}" for file in files_of(staging) if (why := problem_with_name(file))]:
             listed = "\n".join(wrong)
             raise ValueError(f"not published, because some systems refuse these file names. Rename them:\n{listed}")
         _describe(staging, files, campaign, source.revision, cost)
-        checksums = {path: sha256_of(staging / path) for path in files_of(staging)}
-        write_crate(staging, publication, jobs, campaign=campaign.name, revision=source.revision, checksums=checksums)
-        checksums[CRATE] = sha256_of(staging / CRATE)
-        _write(staging / CHECKSUMS, "".join(f"{checksums[path]}  {path}\n" for path in sorted(checksums)))
+        write_checksums(staging, [str(staging / path) for path in files_of(staging)], staging / CHECKSUMS)
+        for path in files_of(staging):
+            (staging / path).chmod(0o644)
         with whole_file(archive) as temporary:
             _write_zip(temporary, staging, folder.name)
             sync_folder(staging)
@@ -94,18 +89,10 @@ def make_deposit(
 
 
 def refuse_mixed(results: Path, campaign: Campaign) -> None:
-    """Raise ValueError if results do not belong to the campaign, or files have changed since their jobs wrote them.
+    """Raise ValueError if results in a folder do not belong to the campaign, or have changed since jobs wrote them.
 
-    Parameters
-    ----------
-    results : folder of results of the campaign.
-    campaign : configuration of the campaign.
-
-    Raises
-    ------
-    ValueError
-        If the stamp of a surface, a run, theories or the campaign dataset is not the expected one, or if a file differs
-        from the list of checksums. The message lists these files.
+    The stamps of surfaces, runs, theories and the campaign dataset must be the expected ones, and the files must have
+    the checksums in the list of the results. The message lists all files that differ.
     """
     refuse_outdated(expected_stamps(campaign, str(results)))
     dataset = results / campaign_files(campaign).dataset
@@ -122,42 +109,33 @@ def refuse_mixed(results: Path, campaign: Campaign) -> None:
         )
 
 
-def _describe(staging: Path, files: Sequence[str], campaign: Campaign, revision: str, cost: Cost) -> None:
-    """Write licence, CITATION.cff, metadata, data dictionary and README.md of the deposit."""
+def _describe(staging: Path, files: Iterable[str], campaign: Campaign, revision: str, cost: Cost) -> None:
+    """Write CITATION.cff, metadata for Zenodo, data dictionary, README.md and crate of the deposit."""
     publication = campaign.deposit_metadata()
-    _write(staging / "LICENSE.txt", find_licence(publication.license).page())
-    _write(staging / "CITATION.cff", citation_cff(publication, revision))
-    for name, metadata in ((ZENODO, zenodo_metadata(publication)), ("datacite.json", datacite_metadata(publication))):
-        _write(staging / name, json.dumps(metadata, indent=1, ensure_ascii=False) + "\n")
-    _write(staging / "data_dictionary.csv", data_dictionary(staging, files))
-    error = staging / "aggregated/model_error.nc"
+    texts = {
+        "CITATION.cff": citation_cff(publication, revision),
+        ZENODO: json.dumps(zenodo_metadata(publication), indent=1, ensure_ascii=False) + "\n",
+        "data_dictionary.csv": data_dictionary(staging, files),
+    }
+    for name, text in texts.items():
+        (staging / name).write_text(text, encoding="utf-8", newline="\n")
+    sizes = {path: (staging / path).stat().st_size for path in files_of(staging)}
+    checks = read_checks(staging / "checks.json")
     # The dataset may be large and the page shows little of it, so it is not loaded into memory.
     with xr.open_datatree(staging / f"dataset/{campaign.name}.nc", engine="netcdf4") as dataset:
-        page = readme(
-            campaign,
-            revision=revision,
-            dataset=dataset,
-            checks=read_checks(staging / "checks.json"),
-            model_error=read_campaign(error) if error.is_file() else None,
-            sizes={path: (staging / path).stat().st_size for path in files_of(staging)},
-            cost=cost,
-        )
-    _write(staging / README, page)
-
-
-def _write(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8", newline="\n")
-    path.chmod(0o644)
+        page = readme(campaign, revision=revision, dataset=dataset, checks=checks, sizes=sizes, cost=cost)
+    (staging / README).write_text(page, encoding="utf-8", newline="\n")
+    sizes[README] = (staging / README).stat().st_size
+    write_crate(staging, publication, campaign=campaign.name, revision=revision, sizes=sizes)
 
 
 def _write_zip(path: Path, folder: Path, name: str) -> None:
     """Write a folder to a zip as folder `name`, uncompressed, because compressed bytes depend on the zlib version."""
     with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
         for file in files_of(folder):
-            status = (folder / file).stat()
             entry = zipfile.ZipInfo(f"{name}/{file}", date_time=_NO_TIME)
             entry.create_system = _UNIX
-            entry.external_attr = (0o100000 | (0o755 if status.st_mode & 0o100 else 0o644)) << 16
-            entry.file_size = status.st_size
+            entry.external_attr = 0o100644 << 16
+            entry.file_size = (folder / file).stat().st_size
             with (folder / file).open("rb") as content, archive.open(entry, "w") as stored:
                 shutil.copyfileobj(content, stored, _BLOCK)

@@ -1,4 +1,4 @@
-"""Metadata of a deposit: licence, CITATION.cff, files for Zenodo and DataCite, attributes of the campaign dataset."""
+"""Metadata of a deposit: licence, CITATION.cff, metadata for Zenodo, attributes of the campaign dataset."""
 
 import json
 import re
@@ -10,36 +10,19 @@ import yaml
 from packaging.licenses import InvalidLicenseExpression, canonicalize_license_expression
 
 from icha.configuration.campaign import Campaign
-from icha.configuration.publication import Author, Funding, Publication, RelatedIdentifier
+from icha.configuration.publication import Author, Funding, Publication
 from icha.contact.models import MODEL_PAPER
-from icha.deposit.verify import SOURCE, ZENODO, read_text
+from icha.deposit.verify import ZENODO, read_text
 
-_FOLDER = Path(__file__).parent
-TABLES = yaml.safe_load((_FOLDER / "tables.yaml").read_text(encoding="utf-8"))
+TABLES = yaml.safe_load(Path(__file__).with_name("tables.yaml").read_text(encoding="utf-8"))
 
 
 class Licence(NamedTuple):
-    """A licence of data.
-
-    Attributes
-    ----------
-    identifier : SPDX identifier of the licence.
-    name, address : name and web address of the licence.
-    text : full text of the licence; "" if ICHA does not contain the text.
-    """
+    """A licence of data: SPDX identifier, name and web address."""
 
     identifier: str
     name: str
     address: str
-    text: str
-
-    def page(self) -> str:
-        """Return the text of LICENSE.txt of a deposit whose data have this licence."""
-        statement = (
-            f"Data, figures and texts of this deposit: {self.name} ({self.identifier})\n{self.address}\n\n"
-            f"The program in {SOURCE}/ has another licence: {SOURCE}/LICENSE\n"
-        )
-        return f"{statement}\n{'-' * 72}\n\n{self.text}" if self.text else statement
 
 
 def find_licence(identifier: str) -> Licence:
@@ -61,10 +44,7 @@ def find_licence(identifier: str) -> Licence:
         )
     if identifier != found:
         raise ValueError(f"has another spelling in the SPDX list; expected {found!r}")
-    if found not in TABLES["licences"]:
-        return Licence(found, found, f"https://spdx.org/licenses/{found}.html", "")
-    text = (_FOLDER / f"license_texts/{found}.txt").read_text(encoding="utf-8")
-    return Licence(found, *TABLES["licences"][found], text)
+    return Licence(found, *TABLES["licences"].get(found, (found, f"https://spdx.org/licenses/{found}.html")))
 
 
 def licence_problem(campaign: Campaign) -> tuple[str, str] | None:
@@ -137,14 +117,14 @@ def citation_cff(publication: Publication, revision: str) -> str:
         "version": publication.version,
         "date-released": publication.date,
         # The format accepts only the SPDX licences of 2021. Any other licence is given by its web address.
-        "license": licence.identifier if licence.text else None,
-        "license-url": None if licence.text else licence.address,
+        "license": licence.identifier if licence.identifier in TABLES["licences"] else None,
+        "license-url": None if licence.identifier in TABLES["licences"] else licence.address,
         "commit": revision,
         "doi": publication.doi,
         "keywords": publication.keywords,
         "references": [paper],
     }
-    return yaml.safe_dump(_without_empty(content), sort_keys=False, allow_unicode=True, width=100)
+    return yaml.safe_dump(without_empty(content), sort_keys=False, allow_unicode=True, width=100)
 
 
 def _cff_author(author: Author) -> dict[str, str | None]:
@@ -197,7 +177,7 @@ def zenodo_metadata(publication: Publication) -> dict[str, Any]:
         "communities": [{"identifier": community} for community in publication.communities],
         "notes": _html(notes),
     }
-    return _without_empty(content)
+    return without_empty(content)
 
 
 def read_zenodo_metadata(folder: Path) -> dict[str, Any]:
@@ -211,98 +191,6 @@ def read_zenodo_metadata(folder: Path) -> dict[str, Any]:
     return metadata
 
 
-def summary_of(metadata: dict[str, Any]) -> dict[str, str]:
-    """Return title, version, authors, licence and communities of Zenodo metadata as text; values may have any type."""
-
-    def join(entries: Any, key: str) -> str:
-        entries = entries if isinstance(entries, list) else ()
-        return "; ".join(str(each.get(key, "")) for each in entries if isinstance(each, dict))
-
-    texts = {name: str(metadata.get(name, "")) for name in ("title", "version", "license")}
-    communities = join(metadata.get("communities"), "identifier")
-    return texts | {"authors": join(metadata.get("creators"), "name"), "community": communities}
-
-
-def datacite_metadata(publication: Publication) -> dict[str, Any]:
-    """Return the metadata of `datacite.json` in DataCite's schema 4.5 (https://doi.org/10.14454/g8e5-6293).
-
-    The publisher is Zenodo if the DOI is from Zenodo, and otherwise `:tba`, DataCite's code for "to be announced".
-    """
-    licence = find_licence(publication.license)
-    paper = RelatedIdentifier(identifier=f"arXiv:{MODEL_PAPER.arxiv}", relation="Cites", resource="Preprint")
-    rights = {
-        "rights": licence.name,
-        "rightsUri": licence.address,
-        "rightsIdentifier": licence.identifier,
-        "rightsIdentifierScheme": "SPDX",
-        "schemeUri": "https://spdx.org/licenses/",
-    }
-    related = [
-        {
-            "relatedIdentifier": each.identifier,
-            "relatedIdentifierType": _datacite_type(each.identifier),
-            "relationType": each.relation,
-            "resourceTypeGeneral": each.resource,
-        }
-        for each in (*publication.related_identifiers, paper)
-    ]
-    content = {
-        "schemaVersion": "http://datacite.org/schema/kernel-4",
-        "doi": publication.doi,
-        "types": {"resourceTypeGeneral": "Dataset", "resourceType": "Simulation results"},
-        "creators": [_datacite_creator(author) for author in publication.authors],
-        "titles": [{"title": publication.title}],
-        "publisher": {"name": "Zenodo" if (publication.doi or "").startswith("10.5281/zenodo.") else ":tba"},
-        "publicationYear": publication.date[:4],
-        "dates": [{"date": publication.date, "dateType": "Issued"}],
-        "version": publication.version,
-        "language": "en",
-        "descriptions": [{"description": publication.summary, "descriptionType": "Abstract"}],
-        "subjects": [{"subject": keyword} for keyword in publication.keywords],
-        "rightsList": [rights],
-        "relatedIdentifiers": related,
-        "fundingReferences": [_datacite_funding(funding) for funding in publication.funding],
-    }
-    return _without_empty(content)
-
-
-def _datacite_creator(author: Author) -> dict[str, Any]:
-    identifier, scheme = (author.orcid_address, "ORCID") if author.is_person else (author.ror, "ROR")
-    named = {"nameIdentifier": identifier, "nameIdentifierScheme": scheme, "schemeUri": f"https://{scheme.lower()}.org"}
-    place = {"name": author.affiliation}
-    if author.ror:
-        place |= {
-            "affiliationIdentifier": author.ror,
-            "affiliationIdentifierScheme": "ROR",
-            "schemeUri": "https://ror.org",
-        }
-    return {
-        "name": author.sorted_name,
-        "nameType": "Personal" if author.is_person else "Organizational",
-        "givenName": author.given_names,
-        "familyName": author.family_names,
-        "nameIdentifiers": [named] if identifier else [],
-        "affiliation": [place] if author.affiliation else [],
-    }
-
-
-def _datacite_type(identifier: str) -> str:
-    return "DOI" if identifier.startswith("10.") else "arXiv" if identifier.startswith("arXiv:") else "URL"
-
-
-def _datacite_funding(funding: Funding) -> dict[str, Any]:
-    identifier = funding.funder_id or ""
-    registry = "ROR" if "ror.org" in identifier else "Crossref Funder ID" if "10.13039/" in identifier else "Other"
-    return {
-        "funderName": funding.funder,
-        "funderIdentifier": web_address(identifier),
-        "funderIdentifierType": identifier and registry,
-        "awardNumber": funding.award_number,
-        "awardTitle": funding.award_title,
-        "awardUri": funding.award_url and web_address(funding.award_url),
-    }
-
-
 def paragraphs(text: str) -> list[str]:
     """Split a text at empty lines into paragraphs, and join the lines of each paragraph."""
     return [" ".join(part.split()) for part in re.split(r"\n\s*\n", text) if part.strip()]
@@ -313,9 +201,9 @@ def _html(texts: list[str]) -> str:
     return "".join(f"<p>{escape(text, quote=False)}</p>" for text in texts)
 
 
-def _without_empty(content: Any) -> Any:
+def without_empty(content: Any) -> Any:
     """Return nested mappings and lists without empty entries of mappings."""
     if isinstance(content, dict):
-        pruned = {key: _without_empty(value) for key, value in content.items()}
+        pruned = {key: without_empty(value) for key, value in content.items()}
         return {key: value for key, value in pruned.items() if value not in (None, [], "")}
-    return [_without_empty(each) for each in content] if isinstance(content, list) else content
+    return [without_empty(each) for each in content] if isinstance(content, list) else content

@@ -7,14 +7,12 @@ from pathlib import Path
 from urllib.parse import quote
 
 import jinja2
-import numpy as np
 import xarray as xr
 
-from icha.analysis.checks import COMPLETED, worst
+from icha.analysis.checks import COMPLETED
 from icha.checks.findings import Check
 from icha.configuration.campaign import Campaign
 from icha.configuration.publication import Publication
-from icha.configuration.surfaces import SelfAffineSurface
 from icha.contact.models import MODEL_PAPER
 from icha.datasets.campaign import run_place, runs_of_status
 from icha.datasets.labels import LABELS, slopes_of
@@ -30,7 +28,6 @@ from icha.deposit.verify import COMPUTED
 from icha.planning.costs import Cost
 from icha.support import formatting
 
-_TEMPLATE = "README.md.jinja"
 # The page shows at most this number of entries of a list.
 _MOST_NAMES = 12
 # A web address in a text, without the punctuation that follows the address.
@@ -46,7 +43,6 @@ def readme(
     revision: str,
     dataset: xr.DataTree,
     checks: Sequence[Check],
-    model_error: xr.DataTree | None,
     sizes: Mapping[str, int],
     cost: Cost,
 ) -> str:
@@ -56,13 +52,30 @@ def readme(
     ----------
     campaign : configuration with complete metadata.
     revision : revision of the source of the program.
-    dataset, checks, model_error : results of the campaign.
+    dataset, checks : results of the campaign.
     sizes : size of every file in bytes, by path in the deposit.
     cost : expected time and memory for computing the whole campaign.
     """
     publication = campaign.deposit_metadata()
     authors = "; ".join(author.sorted_name for author in publication.authors)
-    text = _template().render(
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent),
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    environment.filters |= {
+        "text": markdown,
+        "acknowledgement": acknowledgement,
+        "link": _link,
+        "number": "{:.4g}".format,
+        "value": "{:z.2g}".format,
+        "size": formatting.size,
+        "duration": formatting.duration,
+        "few": _few,
+    }
+    text = environment.get_template("README.md.jinja").render(
+        campaign=campaign,
         publication=publication,
         citation=f"{authors} ({publication.date[:4]}): {publication.title}. Version {publication.version}. Data set.",
         paper=MODEL_PAPER,
@@ -75,50 +88,11 @@ def readme(
         files=len(sizes),
         size=sum(sizes.values()),
         computed=sum(size for path, size in sizes.items() if path.split("/")[0] in COMPUTED),
-        errors=_model_errors(model_error) if model_error is not None else [],
-        **_settings(campaign),
+        compared="aggregated/model_error.nc" in sizes,
+        figure_data=next((path for path in sorted(sizes) if re.fullmatch(r"figures/[^/]+\.csv", path)), ""),
         **_outcome(publication, dataset, checks),
     )
     return text.rstrip() + "\n"
-
-
-def _template() -> jinja2.Template:
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent),
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        undefined=jinja2.StrictUndefined,
-    )
-    environment.filters |= {
-        "text": markdown,
-        "acknowledgement": acknowledgement,
-        "link": _link,
-        "number": "{:.4g}".format,
-        "value": "{:z.2g}".format,
-        "size": formatting.size,
-        "duration": formatting.duration,
-        "span": _span,
-        "few": _few,
-    }
-    return environment.get_template(_TEMPLATE)
-
-
-def _settings(campaign: Campaign) -> dict:
-    """Return surfaces, materials and other settings for the page, without variants of surfaces and materials."""
-    surfaces, materials = (
-        {name: each for name, each in getattr(campaign, section).items() if campaign.origin(section, name) == name}
-        for section in ("surfaces", "materials")
-    )
-    return {
-        "campaign": campaign,
-        "surfaces": surfaces,
-        "materials": materials,
-        "self_affine": any(isinstance(each, SelfAffineSurface) for each in surfaces.values()),
-        "adhesive": any(material.surface_energy > 0 for material in campaign.materials.values()),
-        "both_ways": any(study.unload or study.turning_points for study in campaign.studies.values()),
-        "free": any(campaign.is_free(name) for name in campaign.surfaces),
-    }
 
 
 def _outcome(publication: Publication, dataset: xr.DataTree, checks: Sequence[Check]) -> dict:
@@ -145,26 +119,11 @@ def _outcome(publication: Publication, dataset: xr.DataTree, checks: Sequence[Ch
         "beyond_model": sum(study["status"][STATUS_MEANINGS[BEYOND_MODEL]] for study in designs),
         "example": example,
         "slope_place": run_place(study, example)["rms_slope"],
-        "checks": worst(checks),
         "failed": [check for check in checks if not check.passed and check.name != COMPLETED],
         "known": known,
-        "count": Counter(check.name for check in checks),
         "passed": sum(check.passed for check in checks),
         "total": len(checks),
     }
-
-
-def _model_errors(tree: xr.DataTree) -> list[dict]:
-    """Return, for each entry and material, the smallest and the largest error of all loads, surfaces and slopes."""
-    found = []
-    for entry, node in tree.children.items():
-        for material, errors in node.to_dataset().groupby("material"):
-            means = [errors[f"{quantity}_error_mean"] for quantity in ("area", "separation")]
-            area, separation = ((float(each.min()), float(each.max())) for each in means)
-            if np.isfinite(area).all():
-                names = {"entry": entry, "study": node.attrs["study"], "material": material}
-                found.append(names | {"area": area, "separation": separation})
-    return found
 
 
 def _parts(sizes: Mapping[str, int]) -> list[dict]:
@@ -177,7 +136,7 @@ def _parts(sizes: Mapping[str, int]) -> list[dict]:
     rows = [(part if part in sizes else f"{part}/", part, content) for part, content in TABLES["contents"].items()]
     return [
         {"path": path, "content": content, "files": len(grouped[part]), "size": sum(grouped[part])}
-        for path, part, content in [*rows, (others, "", "citation, licence, and metadata for Zenodo and DataCite")]
+        for path, part, content in [*rows, (others, "", "citation, and metadata for Zenodo")]
         if part in grouped
     ]
 
@@ -203,8 +162,3 @@ def _link(address: str) -> str:
     """Return a web address as a link in Markdown."""
     plain = re.sub(r"[\s<>|`\\]", lambda found: quote(found[0]), address)
     return f"<{plain}>"
-
-
-def _span(ends: tuple[float, float]) -> str:
-    """Return a text with the smallest and the largest error in per cent."""
-    return "{:+z.1%} to {:+z.1%}".format(*ends)

@@ -10,18 +10,16 @@ from collections.abc import Iterable
 from importlib.metadata import version
 from pathlib import Path
 
-import netCDF4
-
 from icha.configuration.errors import ConfigurationError
 from icha.configuration.load import INPUTS, load_configuration
 from icha.configuration.yaml_files import read_yaml
 from icha.datasets.attributes import why_no_result
 from icha.datasets.results import CONFIGURATION, RUN
+from icha.datasets.stamp import read_stamp
 from icha.deposit.program import version_differences
 from icha.deposit.verify import CHECKSUMS, SOURCE, files_of, read_text
 from icha.support.checksums import sha256_of
 from icha.support.formatting import format_count
-from icha.support.input_files import refuse_traps
 from icha.support.values import NAME_PATTERN
 
 SMALLEST = "smallest"
@@ -55,10 +53,7 @@ def campaign_name(deposit: Path) -> str:
 
 
 def other_versions(deposit: Path) -> tuple[list[str], list[str]]:
-    """List ICHA and packages whose installed versions differ from the versions that made the deposit.
-
-    The first list has ICHA and the packages that compute (`_COMPUTING`); the second list has all other packages.
-    """
+    """List packages whose installed versions are not those of the deposit: ICHA and `_COMPUTING`, then all others."""
     try:
         made_by = tomllib.loads(read_text(deposit, _PYPROJECT))["project"]["version"]
         found = version_differences(read_text(deposit, _LOCK))
@@ -73,27 +68,16 @@ def other_versions(deposit: Path) -> tuple[list[str], list[str]]:
 
 
 def find_runs(only: Iterable[str], deposit: Path) -> list[str]:
-    """Return the paths of the selected runs in a deposit; the user selects runs by name.
+    """Return the paths of the runs of a deposit that a user selects by name, or by `SMALLEST`.
 
-    Parameters
-    ----------
-    only : names of runs, such as `study/surface/seed1/slope1/material`, or `SMALLEST`.
-    deposit : folder of the deposit.
-
-    Raises
-    ------
-    RerunError
-        If the deposit does not have a run of this name.
+    A name is `study/surface/seed1/slope1/material`, as in the path of the run. Raise `RerunError` for other names.
     """
     runs = [name for name in files_of(deposit) if _RUN.fullmatch(name)]
     found = []
     for name in only:
-        if name == SMALLEST and runs:
-            found.append(_smallest(deposit, runs))
-            continue
-        path = f"runs/{name.removeprefix('runs/').removesuffix('.nc')}.nc"
+        path = _smallest(deposit, runs) if name == SMALLEST and runs else f"runs/{_label(name)}.nc"
         if path not in runs:
-            such_as = f", such as {runs[0].removeprefix('runs/').removesuffix('.nc')}" if runs else ""
+            such_as = f", such as {_label(runs[0])}" if runs else ""
             raise RerunError(
                 f"--only {name}: the deposit has no such run; expected {SMALLEST}, or one of its "
                 f"{format_count(len(runs), 'run')}{such_as}"
@@ -102,22 +86,20 @@ def find_runs(only: Iterable[str], deposit: Path) -> list[str]:
     return list(dict.fromkeys(found))
 
 
+def _label(path: str) -> str:
+    return path.removeprefix("runs/").removesuffix(".nc")
+
+
 def _smallest(deposit: Path, runs: list[str]) -> str:
     """Return the complete run for which the files of run and surface have the smallest total size."""
     sizes = {run: sum((deposit / path).stat().st_size for path in add_surfaces([run], deposit)) for run in runs}
     for run in sorted(runs, key=lambda run: sizes[run]):
-        if _is_complete(deposit, run):
+        attributes = read_stamp(deposit / run, ("incomplete", "failed_checks"))
+        if attributes is None:
+            raise RerunError(f"{run}: is not the file of a run, or is damaged")
+        if not why_no_result(attributes):
             return run
     raise RerunError(f"--only {SMALLEST}: no run of the deposit is complete; expected the name of a run")
-
-
-def _is_complete(deposit: Path, run: str) -> bool:
-    try:
-        refuse_traps(deposit / run)
-        with netCDF4.Dataset(deposit / run) as file:
-            return "step" in file.dimensions and len(file.dimensions["step"]) > 0 and not why_no_result(file.__dict__)
-    except (OSError, ValueError, RuntimeError) as error:  # netCDF4 raises RuntimeError for damaged files
-        raise RerunError(f"{run}: is not the file of a run: {error}") from None
 
 
 def add_surfaces(runs: Iterable[str], deposit: Path) -> list[str]:

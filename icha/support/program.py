@@ -16,15 +16,5 @@ def own_workflow() -> Path:
     return beside if (beside / "Snakefile").is_file() else beside / INSTALLED
 
 
-def is_installed(workflow: Path) -> bool:
-    """Return whether the folder of a workflow comes from an installation, not from a clone of the repository."""
-    return workflow.name == INSTALLED and not (workflow / "icha").is_dir()
-
-
-def package_of(workflow: Path) -> Path:
-    """Return the folder of the package `icha`: inside a clone, or next to the folder of an installed workflow."""
-    return (workflow.parent if is_installed(workflow) else workflow) / "icha"
-
-
 if __name__ == "__main__":
     print(own_workflow())

@@ -6,7 +6,6 @@ import shutil
 from importlib.metadata import version
 from types import SimpleNamespace
 
-import h5py
 import netCDF4
 import numpy as np
 import pytest
@@ -236,13 +235,8 @@ def test_damaged_deposits_and_those_without_results_are_refused(deposit, reprodu
     assert reproduce(tmp_path / "none")[0] == 2 and not computed
 
 
-@pytest.mark.parametrize("content", [b"no netCDF", "link"])
-def test_what_is_called_a_run_and_is_none_is_not_followed(content, deposit, reproduce, computed, tmp_path):
-    if content == "link":
-        with h5py.File(tmp_path / "run.nc", "w") as file:
-            file["step"] = h5py.ExternalLink(str(tmp_path / "other.nc"), "/step")
-        content = (tmp_path / "run.nc").read_bytes()
-    status, output = reproduce(deposit(**dict.fromkeys(RUNS, content)), "--only=smallest")
+def test_what_is_called_a_run_and_is_none_is_refused(deposit, reproduce, computed):
+    status, output = reproduce(deposit(**dict.fromkeys(RUNS, b"no netCDF")), "--only=smallest")
     assert (
         status == 2
         and re.search("soft.nc: is not the file of a run|hard.nc: is not the file of a run", output)

@@ -3,7 +3,6 @@
 import os
 import random
 import stat
-import struct
 import zipfile
 from types import SimpleNamespace
 
@@ -13,7 +12,7 @@ from typer.testing import CliRunner
 
 from icha.cli import app
 from icha.deposit import verify
-from icha.deposit.verify import DamagedDeposit, files_of, problem_with_name, read_text, whole_deposit
+from icha.deposit.verify import DamagedDeposit, files_of, read_text, whole_deposit
 from icha.support.formatting import printable
 
 FILES = {"README.md": "# Tiny\n", "runs/load/soft.nc": bytes(range(256)) * 20, "inputs/Höhen (2).txt": "1 2\n"}
@@ -124,40 +123,12 @@ def test_links_and_devices_in_a_zip_become_files(mode, tmp_path):
     assert problem.startswith("link: was added")
 
 
-def test_what_unpacks_to_far_more_is_not_unpacked_unless_asked(pack, monkeypatch):
+def test_what_unpacks_to_far_more_is_not_unpacked(pack, monkeypatch):
     folder = pack({"zeros": bytes(10_000_000)})
     monkeypatch.setattr(verify, "ALLOWANCE", 1000)
     (problem,) = problems_with(folder.with_name("tiny.zip"))
     assert "to 10 MB; expected at most 50 times its size" in problem
-    assert problems_with(folder.with_name("tiny.zip"), large=True) == []
-
-
-@pytest.mark.parametrize("ending", ["", ".zip"])
-def test_the_number_of_files_is_bounded(ending, folder, monkeypatch):
-    monkeypatch.setattr(verify, "MOST_FILES", 2)
-    (problem,) = problems_with(folder.with_name(folder.name + ending))
-    assert "files or more; expected at most 2. Use --large" in problem
-
-
-@pytest.mark.parametrize("declared", [3, 5, 10_000_000])
-def test_no_more_bytes_are_written_than_are_declared(declared, folder, tmp_path):
-    path = folder.with_name("tiny.zip")
-    content = bytearray(path.read_bytes())
-    place = content.rindex(b"PK\x01\x02") + 24  # the uncompressed size of the last entry in the list of contents
-    struct.pack_into("<I", content, place, declared)
-    path.write_bytes(content)
-    if problems := problems_with(path):
-        assert "not a readable zip archive" in problems[0]
-    else:
-        assert declared > len(FILES["runs/load/soft.nc"])  # it ends before, with the bytes that were packed
-
-
-def test_an_encrypted_file_is_not_read(folder):
-    path = folder.with_name("tiny.zip")
-    content = bytearray(path.read_bytes())
-    content[content.rindex(b"PK\x01\x02") + 8] |= 1
-    path.write_bytes(content)
-    assert "not a readable zip archive" in problems_with(path)[0]
+    assert problems_with(folder) == []
 
 
 def test_unpacking_needs_room(folder, monkeypatch):
@@ -177,8 +148,3 @@ def test_no_more_than_a_hundred_problems_are_printed(folder):
         (folder / f"added{k}").touch()
     done = CliRunner().invoke(app, ["verify", str(folder)])
     assert done.exit_code == 1 and "… and 50 more" in done.output and "damaged: 150 problems" in done.output
-
-
-def test_names_are_too_long_where_file_systems_say_so():
-    assert problem_with_name("a" * 255) == problem_with_name(".zenodo.json") == ""
-    assert problem_with_name("a" * 256) == problem_with_name("é" * 128) == "is too long"

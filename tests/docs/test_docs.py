@@ -17,6 +17,7 @@ import own_slopes_campaign as crops
 import pytest
 import xarray as xr
 import yaml
+from outside_validators import sealed
 from sampled_cases import sampled
 
 import icha
@@ -196,6 +197,10 @@ def with_results(folder):
     runs, samples = sampled("uncertain")
     sensitivity = sensitivity_of_campaign(campaign_tree(runs), {"uncertain": samples})
     write_dataset(sensitivity, folder / "results/mine/aggregated/sensitivity.nc")
+    deposit = folder / "results/mine/publish/mine-1.0.0"
+    (deposit / "dataset").mkdir(parents=True)
+    shutil.copyfile(folder / "results/mine/dataset/mine.nc", deposit / "dataset/mine.nc")
+    sealed(deposit)
     write_dataset(crops.tree(), folder / "results/crops/dataset/crops.nc")
     return folder
 

@@ -13,10 +13,8 @@ import contextlib
 import copy
 import functools
 import io
-import json
 import logging
 import re
-import subprocess
 import sys
 import tempfile
 import traceback
@@ -31,7 +29,7 @@ from typing import NamedTuple
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 CRATE = "ro-crate-metadata.json"
-PROFILE = "provenance-run-crate-0.5"
+PROFILE = "ro-crate-1.1"
 CONVENTIONS = "cf:1.11"
 # Attributes by which a variable names others (CF 1.11, appendix A).
 NAMING = "ancillary_variables bounds cell_measures climatology coordinates formula_terms grid_mapping".split()
@@ -56,20 +54,8 @@ class Outcome(NamedTuple):
     remarks: tuple[str, ...] | list[str] = ()
 
 
-def check_checksums(folder: Path) -> Outcome:
-    """`sha256sum --check`: the files are those that the list names."""
-    listed = (folder / "SHA256SUMS").read_text(encoding="utf-8").splitlines()
-    done = subprocess.run(
-        ["sha256sum", "--check", "--strict", "--quiet", "SHA256SUMS"], cwd=folder, capture_output=True, text=True
-    )
-    problems = (done.stdout + done.stderr).splitlines()
-    if done.returncode and not problems:
-        problems = [f"status {done.returncode}"]
-    return Outcome(f"{len(listed)} files", problems)
-
-
 def check_crate(folder: Path) -> Outcome:
-    """roc-validator: the crate is a Provenance Run Crate; what is only recommended is a remark."""
+    """roc-validator: the crate is an RO-Crate 1.1; what is only recommended is a remark."""
     from rocrate_validator import services
     from rocrate_validator.models import Severity
 
@@ -112,61 +98,6 @@ def _cache_contexts(path: Path) -> None:
     with CachedSession(str(path), backend="sqlite", expire_after=-1) as session:
         session.mount("https://", Shelf())
         session.get("https://w3id.org/ro/crate/1.1/context").raise_for_status()
-
-
-def check_actions(folder: Path) -> Outcome:
-    """runcrate: another reader of such crates can list what was run."""
-    from runcrate.report import dump_crate_actions
-
-    crate = folder / CRATE
-    expected = sum("CreateAction" in _types(entity) for entity in json.loads(crate.read_bytes())["@graph"])
-    text = io.StringIO()
-    dump_crate_actions(folder, text)
-    listed = sum(line.startswith("action: ") for line in text.getvalue().splitlines())
-    problems = [] if listed == expected > 0 else [f"{listed} of {expected} actions are listed"]
-    return Outcome(f"{listed} actions", problems)
-
-
-def _types(entity: dict) -> list[str]:
-    types = entity["@type"]
-    return types if isinstance(types, list) else [types]
-
-
-def check_citation(folder: Path) -> Outcome:
-    """cffconvert: CITATION.cff is valid."""
-    from cffconvert import Citation
-
-    citation = Citation((folder / "CITATION.cff").read_text(encoding="utf-8"))
-    try:
-        citation.validate()
-    except Exception as error:
-        return Outcome("CITATION.cff", [str(error).strip().splitlines()[0]])
-    return Outcome(f"CITATION.cff {citation.cffversion}", [])
-
-
-def check_datacite(folder: Path) -> Outcome:
-    """The schema of DataCite 4.5, and its XML can be made from it."""
-    from datacite import schema45
-
-    metadata = json.loads((folder / "datacite.json").read_bytes())
-    problems = _violations(schema45.validator, metadata)
-    if not problems:
-        schema45.tostring(metadata)
-    return Outcome(f"{len(metadata)} properties", problems)
-
-
-def check_zenodo(folder: Path) -> Outcome:
-    """A schema written after Zenodo's documentation of its deposit API; Zenodo publishes no schema."""
-    from jsonschema import Draft7Validator, FormatChecker
-
-    schema = json.loads(Path(__file__).with_name("zenodo.schema.json").read_bytes())
-    metadata = json.loads((folder / ".zenodo.json").read_bytes())
-    problems = _violations(Draft7Validator(schema, format_checker=FormatChecker()), metadata)
-    return Outcome(f"{len(metadata)} properties", problems)
-
-
-def _violations(validator, metadata: dict) -> list[str]:
-    return sorted(f"{'/'.join(map(str, error.path))}: {error.message}" for error in validator.iter_errors(metadata))
 
 
 def check_conventions(folder: Path) -> Outcome:
@@ -292,12 +223,7 @@ def stay_off_the_network() -> None:
 
 
 VALIDATORS: dict[str, Callable[[Path], Outcome]] = {
-    "sha256sum": check_checksums,
     "roc-validator": check_crate,
-    "runcrate": check_actions,
-    "cffconvert": check_citation,
-    "datacite": check_datacite,
-    "zenodo": check_zenodo,
     "compliance-checker": check_conventions,
 }
 
@@ -328,7 +254,7 @@ def validate(folder: Path, names: list[str], most: int) -> bool:
 
 def main() -> int:
     """Validate the deposit on the command line."""
-    from icha.deposit.verify import LARGE, DamagedDeposit, whole_deposit
+    from icha.deposit.verify import DamagedDeposit, whole_deposit
     from icha.support.formatting import printable
     from icha.support.input_files import refuse_traps
 
@@ -338,13 +264,12 @@ def main() -> int:
     parser.add_argument("deposit", type=Path, help="a folder or a zip archive")
     parser.add_argument("--only", nargs="+", choices=VALIDATORS, default=list(VALIDATORS), metavar="NAME")
     parser.add_argument("--all", action="store_true", help="all messages, and not the first five of a kind")
-    parser.add_argument(LARGE, action="store_true", help="accept more files, and zips that unpack to more")
     arguments = parser.parse_args()
     warnings.simplefilter("ignore")
     logging.disable(logging.WARNING)
     name = printable(arguments.deposit)
     try:
-        with whole_deposit(arguments.deposit.absolute(), large=arguments.large) as folder:
+        with whole_deposit(arguments.deposit.absolute()) as folder:
             if not (folder / CRATE).is_file():
                 sys.exit(f"{name}: is not a deposit, because it has no {CRATE}")
             for file in sorted(folder.rglob("*.nc")):

@@ -15,8 +15,8 @@ from tiny_campaign import CAMPAIGN
 
 PYTHON = REPOSITORY / ".venv-slurm/bin/python"
 CONFIGURATION = "config/campaigns/tiny.yaml"
-# Files with measured times or versions.
-MEASURED = ("logs", "benchmarks", "made_with.txt")
+# Folders of files with measured times.
+MEASURED = ("logs", "benchmarks")
 
 
 def results_of(project):

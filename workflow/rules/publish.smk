@@ -3,7 +3,7 @@
 from publishable import publishable_source
 
 # The source is evaluated once, before anything is computed, and only if the deposit is requested.
-SOURCE = cache(lambda: publishable_source(CONFIGURATION, ROOT, RESULTS))
+SOURCE = cache(lambda: publishable_source(CONFIGURATION, ROOT))
 
 
 rule deposit:
@@ -24,7 +24,6 @@ rule deposit:
         runtime=30,
     params:
         results=as_it_is(RESULTS),
-        given=as_it_is(list(NAMED_FILES)),
         project=as_it_is(ROOT),
         # The deposit contains the source, including comments.
         revision=lambda wildcards: SOURCE().revision,

@@ -8,11 +8,10 @@ from icha.configuration.load import load_configuration
 from icha.datasets.results import CONFIGURATION
 from icha.deposit.make import make_deposit, refuse_mixed
 from icha.deposit.program import program_source, refuse_other_environment
-from icha.deposit.steps import campaign_steps
 from icha.planning.plan import whole_cost
 
 
-def publish(archive, *, results, files, given, project):
+def publish(archive, *, results, files, project):
     """Write the deposit as a zip and as a folder.
 
     Parameters
@@ -20,10 +19,9 @@ def publish(archive, *, results, files, given, project):
     archive : zip file to write.
     results : folder of the results.
     files : files of the results that the deposit includes.
-    given : files that the configuration names, as paths in `results`.
     project : folder of the workflow.
     """
-    refuse_other_environment(Path(project), Path(results))
+    refuse_other_environment(Path(project))
     campaign = load_configuration(Path(results, CONFIGURATION)).campaign
     refuse_mixed(Path(results), campaign)
     make_deposit(
@@ -33,7 +31,6 @@ def publish(archive, *, results, files, given, project):
         files=[str(Path(file).relative_to(results)) for file in files],
         campaign=campaign,
         source=program_source(project),
-        jobs=campaign_steps(campaign, given, Path(project)),
         cost=whole_cost(campaign),
     )
 
@@ -44,6 +41,5 @@ if "snakemake" in globals():
             snakemake.output.archive,
             results=snakemake.params.results,
             files=snakemake.input.results,
-            given=snakemake.params.given,
             project=snakemake.params.project,
         )
