@@ -16,7 +16,7 @@ from icha.datasets.surface_file import write_surface
 LOOP = RunLabels("loops", "asperities", "rough", 1, 1.0, "soft")
 FAILED = RunLabels("slopes", "asperities", "rough", 1, 0.2, "hertz")
 NOTHING = RunLabels("slopes", "asperities", "rough", 1, 0.2, "soft")
-REASON = 'the path ends early, at A/A0 < 1 & "for a reason"'
+REASON = 'the path ends early, at A/A0 < 1 & "for a reason" \u202e\x1b[2J'
 
 
 @cache

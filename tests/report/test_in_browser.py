@@ -86,127 +86,68 @@ def choose(page, **choices):
     """Choose from the lists of the page."""
     for name, value in choices.items():
         page.value(
-            f"{{ const list = document.getElementById('{name}'); list.value = {json.dumps(str(value))};"
-            "list.dispatchEvent(new Event('change')); }"
+            f"{{ byId('{name}').value = {json.dumps(str(value))}; byId('{name}').dispatchEvent(new Event('change')); }}"
         )
-        page.settle()
+    page.value("byId('snapshot').focus()")
+    page.settle()
 
 
 def shown(page):
-    """Return what the page shows: step, text, table, and for each model picture, opacity, point and curve."""
+    """Return what the page shows: text, for each model the picture, and in each plot the lines and points."""
     return page.value(
-        """(() => {
-          const at = (id) => document.getElementById(id);
-          const models = Object.keys(runs);
-          return {
-            place: Number(at("stop").value), last: Number(at("stop").max), state: at("state").textContent,
-            table: [...document.querySelectorAll("#values tbody tr")]
-              .map((row) => [...row.cells].map((cell) => cell.textContent)),
-            notices: [...document.querySelectorAll("#notices p")].map((each) => each.textContent),
-            images: models.map((model) => (at(`map-${model}`).layout.images || [])
-              .map((each) => [each.source, each.opacity])[0] || null),
-            points: ["area", "separation"]
-              .map((id) => at(id).data.slice(models.length).map((each) => [each.x[0], each.y[0]])),
-            curves: ["gap_density", "pressure_density", "sizes", "larger"]
-              .map((id) => at(id).data.map((each) => [Array.from(each.y), each.opacity])),
-          };
-        })()"""
+        """({
+          words: byId("words").textContent,
+          maps: [...document.querySelectorAll("#maps svg")].map((map) => map.innerHTML),
+          lines: [...document.querySelectorAll("#plots polyline")].map((line) => line.getAttribute("points")),
+          points: [...document.querySelectorAll("#plots circle")]
+            .map((point) => [point.cx.baseVal.value, point.cy.baseVal.value]),
+        })"""
     )
 
 
 def test_the_slider_moves_contact_points_and_distributions_of_both_models(page):
-    choose(page, study="one", material="soft", model="both")
-    page.value("document.getElementById('stop').focus()")
-    page.press("End")
+    choose(page, study="one", material="soft")
     last = shown(page)
     page.press("ArrowLeft")
     first = shown(page)
-    assert (last["place"], first["place"], last["last"]) == (1, 0, 1)
-    assert last["state"] == "2 of 2: loading, p* = 0.01" and first["state"] == "1 of 2: loading, p* = 0.003"
-    assert [row[:2] for row in first["table"]] == [["asperities", "0.003"], ["boundary elements", "0.003"]]
-    kinds = [re.match(r"data:image/([a-z+]+)", source)[1] for source, _ in first["images"]]
-    assert kinds == ["svg+xml", "png"] and first["notices"] == []
-    for k in range(2):
-        assert first["images"][k][0] != last["images"][k][0] and first["images"][k][1] == last["images"][k][1] == 1
-        assert all(before[k] != after[k] for before, after in zip(first["points"], last["points"], strict=True))
-        assert all(before[k][0] != after[k][0] for before, after in zip(first["curves"], last["curves"], strict=True))
-    area, separation = last["points"]
-    assert area[0][0] == area[1][0] == pytest.approx(0.01) and area[0][1] > first["points"][0][0][1]
-    assert separation[0][1] < first["points"][1][0][1]
-
-
-def test_steps_without_snapshot_have_a_notice(page):
-    choose(page, study="slopes", rms_slope=1, material="soft")
-    page.value("document.getElementById('stop').focus()")
-    page.press("Home")
-    start = shown(page)
-    assert start["images"] == [None] and start["curves"] == [[], [], [], []]
-    assert start["points"][0][0] != [None, None] and "no snapshot up to this step" in start["notices"][0]
-    page.press("ArrowRight")
-    on_it = shown(page)
-    assert on_it["notices"] == [] and on_it["images"][0][1] == 1 and on_it["table"][0][-1] == "yes"
     page.press("End")
-    later = shown(page)
-    assert "pale spots and distributions belong to the previous snapshot" in later["notices"][0]
-    assert later["table"][0][-1] == "no"
-    assert later["images"][0][1] < 1 and {curve[0][1] for curve in later["curves"]} == {0.3}
-    assert later["points"] != on_it["points"]
+    assert shown(page) == last
+    assert last["words"].startswith("Snapshot 2 of 2. asperities, loading: reduced pressure p* = 0.01, contact area")
+    assert first["words"].startswith("Snapshot 1 of 2.") and "boundary elements, loading: reduced" in first["words"]
+    assert [len(first[name]) for name in ("maps", "lines", "points")] == [2, 8, 4]
+    assert all("NaN" not in text for name in ("maps", "lines") for text in first[name] + last[name])
+    assert all(one != other for one, other in zip(first["maps"], last["maps"], strict=True))
+    assert first["lines"][:4] == last["lines"][:4], "the curves stay"
+    assert all(one != other for one, other in zip(first["lines"][4:], last["lines"][4:], strict=True))
+    # The load grows to the right and the contact area upwards; the points are on the curves.
+    assert last["points"][0][0] > first["points"][0][0] and last["points"][0][1] < first["points"][0][1]
+    end = np.array(last["lines"][0].split(" ")[-1].split(","), float)
+    np.testing.assert_allclose(last["points"][0], end, atol=0.01)
 
 
-def test_all_controls_can_be_used_with_keys(page):
-    choose(page, study="one", material="soft")
-    page.value("document.activeElement.blur(); scrollTo(0, 0)")
-    order, outlines = [], []
-    for _ in range(40):
-        page.press("Tab")
-        name, outline = page.value(
-            "[document.activeElement.id, getComputedStyle(document.activeElement).outlineStyle"
-            " + parseFloat(getComputedStyle(document.activeElement).outlineWidth)]"
-        )
-        if not name:
-            break
-        order.append(name), outlines.append(outline)
-    # From top to bottom, without lists of one entry.
-    assert order == ["study", "material", "seed", "model", "log", "before", "stop"], order
-    assert set(outlines) == {"solid3"}
-    # The buttons move between snapshots.
-    choose(page, study="one", material="soft")
-    page.value("document.getElementById('before').focus()")
-    page.press("Enter")
-    assert shown(page)["place"] == 0
-    spoken = page.value("document.getElementById('stop').getAttribute('aria-valuetext')")
-    assert spoken == "1 of 2, loading, p* = 0.003"
-    assert page.value("document.getElementById('state').getAttribute('role')") == "status"
+def test_failures_are_in_words(page):
+    choose(page, study="slopes", rms_slope=0.2, material="hertz")
+    assert "asperities failed: the path ends early, at A/A0 < 1 &" in shown(page)["words"]
 
 
 def test_spots_have_the_positions_of_the_dataset(page):
     """Centres of circles are red, and the red fraction of the map is that of the spots."""
-    choose(page, study="one", material="soft", model="asperities")
-    circles = page.value(
-        "(() => { const kept = leading.snapshots.at(-1).circles.map((text) => Array.from(floats(text)));"
-        "return kept[0].map((x, k) => [x, kept[1][k], kept[2][k]]); })()"
-    )
-    period = page.value("leading.period")
-    place = page.value(
-        "(() => { const map = document.getElementById('map-asperities'), {xaxis, yaxis} = map._fullLayout;"
-        "const box = map.getBoundingClientRect();"
-        "return [xaxis, yaxis].map((axis) => [axis._offset, axis._length, ...axis.range])"
-        ".concat([[box.x + scrollX, box.y + scrollY]]); })()"
+    choose(page, study="one", material="soft")
+    circles = page.value("contact.states.at(-1).asperities.circles")
+    half = page.value("500 / contact.grid")
+    left, top, side = page.value(
+        "(({ x, y, width }) => [x + scrollX, y + scrollY, width])"
+        "(document.querySelector('#maps svg').getBoundingClientRect())"
     )
     pixels = np.asarray(Image.open(io.BytesIO(page.picture())).convert("RGB")).astype(int)
-    (left, width, x_low, x_high), (top, height, y_low, y_high), (box_x, box_y) = place
-    assert x_high - x_low == pytest.approx(period * 1e6)
     for x, y, radius in circles:
-        column = box_x + left + width * (x * 1e6 - x_low) / (x_high - x_low)
-        row = box_y + top + height * (y_high - y * 1e6) / (y_high - y_low)
-        inside = left + 3 < column - box_x < left + width - 3 and top + 3 < row - box_y < top + height - 3
-        if inside and radius / period * width > 2:
+        column, row = left + side * (x + half) / 1000, top + side * (1000 - half - y) / 1000
+        if left + 3 < column < left + side - 3 and top + 3 < row < top + side - 3 and radius * side > 2000:
             red, green, blue = pixels[round(row), round(column)]
             assert red > 150 and green < 90 and blue < 90, (x, y)
-    inner = pixels[round(box_y + top) + 2 : round(box_y + top + height) - 2, round(box_x + left) + 2 :]
-    inner = inner[:, : round(width) - 4]
+    inner = pixels[round(top) : round(top + side), round(left) : round(left + side)]
     red_fraction = (inner[..., 0] > inner[..., 1] + 60).mean()
-    assert red_fraction == pytest.approx(sum(np.pi * radius**2 for *_, radius in circles) / period**2, rel=0.25)
+    assert red_fraction == pytest.approx(sum(np.pi * radius**2 for *_, radius in circles) / 1e6, rel=0.25)
 
 
 def brightness(colour):
@@ -218,13 +159,9 @@ def test_nothing_is_wider_than_the_window(page, width):
     page.show(width, 800)
     choose(page, study="one", material="soft")
     assert page.value("[document.documentElement.scrollWidth, innerWidth]") == [width, width]
-    # The slider remains visible, and leaves room for the pictures.
     page.value("scrollTo(0, 1500)")
     page.settle()
-    top, bottom = page.value(
-        "(({top, bottom}) => [top, bottom])(document.getElementById('path').getBoundingClientRect())"
-    )
-    assert top == 0 and bottom < 250
+    assert page.value("document.querySelector('form').getBoundingClientRect().top") == 0
 
 
 def test_errors_and_requests_are_detected(browser, explorer_file, tmp_path):

@@ -14,7 +14,6 @@ from icha.cli.project import UserError, echo, reports_errors
 from icha.cli.run import _print_reasons
 from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import write_surface
-from icha.report.explorer import _filled
 from icha.report.template import template
 from icha.support.formatting import printable, printable_lines
 
@@ -82,9 +81,3 @@ def test_pages_hold_no_overrides_and_no_control_characters():
     text = page.render(title=EVIL + "<b>", n=3, safe="<i>\u200d</i>")
     assert not set("\x1b\x9b\r\b\u202e\u2028") & set(text)
     assert text.count(r"\u202e") == 2 and "<b>" not in text and text.endswith("3 <i>\u200d</i>")
-
-
-def test_the_data_of_the_page_of_paths_are_printable():
-    campaign = SimpleNamespace(attrs={"title": EVIL, "campaign": EVIL})
-    page = _filled(campaign, {"contacts": [{"study": EVIL, "steps": [1.0, 2]}]}, library="", largest=1)
-    assert not set("\x1b\x9b\b\u202e\u2028") & set(page) and page.count(r"\\u202e") == 1 and "[1.0, 2]" in page
