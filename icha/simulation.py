@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 from threadpoolctl import threadpool_limits
 
-from icha.asperity.full_contact import HIGH_PULL_OFF_BELOW, full_contact_energy_ratio
+from icha.asperity.full_contact import full_contact_energy_ratio
 from icha.asperity.material import Material
 from icha.asperity.stickiness import stickiness
 from icha.checks.run import attributes_of_failure, check_run
@@ -253,13 +253,9 @@ def _dataset(surface, material, path, name, seed, record, summits, reasons, of_c
         table | CYCLE | INDENTER | _describe_targets(table, path), values, _attributes(surface, material, path, name)
     )
     if MODELS[name].by_summits:
-        ratio = math.inf if surface.smooth else values["full_contact_energy_ratio"]
-        # Contact area and mean gap of the square say nothing about the contact of a shape.
-        conformal = surface.shape is not None
-        rough = [] if conformal else record.steps
-        largest = max((step["contact_area_fraction"] for step in rough), default=0.0)
-        gap = min((step["mean_gap"] for step in rough), default=math.inf) / surface.unit_height
-        applicability = asperity_applicability(ratio, reasons, largest, gap, conformal=conformal)
+        largest = max((step["contact_area_fraction"] for step in record.steps), default=0.0)
+        gap = min((step["mean_gap"] for step in record.steps), default=math.inf) / surface.unit_height
+        applicability = asperity_applicability(values["full_contact_energy_ratio"], reasons, largest, gap)
     else:
         applicability = f"{MODELS[name].words} not applicable: {'; '.join(reasons)}" if reasons else ""
     dataset.attrs["applicability"] = applicability
@@ -286,8 +282,6 @@ def asperity_applicability(
     summit_reasons: Sequence[str] = (),
     contact_area_fraction: float = 0.0,
     reduced_gap: float = math.inf,
-    *,
-    conformal: bool = False,
 ) -> str:
     """Return the reasons why the asperity model is not applicable, as text; the text is empty if the model applies.
 
@@ -297,14 +291,8 @@ def asperity_applicability(
     summit_reasons : reasons why the summits do not represent the surface.
     contact_area_fraction : largest contact area fraction A/A0 of the run.
     reduced_gap : smallest mean gap of the run, divided by the rms height.
-    conformal : True for roughness on a shape that presses it into the elastic body.
     """
     reasons, ratio = [], f"U_full/dgamma = {full_contact_energy_ratio:.3g}"
-    if conformal and full_contact_energy_ratio < HIGH_PULL_OFF_BELOW:
-        reasons.append(
-            f"the elastic body conforms to most of the roughness under the shape ({ratio}, less than "
-            f"{HIGH_PULL_OFF_BELOW:g})"
-        )
     reasons += summit_reasons
     limit = largest_area_fraction(full_contact_energy_ratio)
     if contact_area_fraction > limit:

@@ -257,6 +257,10 @@ class Campaign(Section):
             if MODELS[label].by_summits and self.materials[name].thickness is not None:
                 reason = f"need a half-space, because their law is that of a half-space, but {name!r} is a layer"
                 yield ("models", index), label, f"{reason}; expected [boundary_elements], or no `thickness` in {name!r}"
+        for (index, label), name in itertools.product(enumerate(study.models), study.surfaces):
+            if MODELS[label].by_summits and not self.is_flat(name):
+                reason = f"need a nominally flat surface, because they are wrong on shapes, but {name!r} has a shape"
+                yield ("models", index), label, f"{reason}; expected [boundary_elements]"
         for name, label in itertools.product(study.surfaces, study.materials):
             thickness, known = self.materials[label].thickness, self._grid_and_period(name)
             if thickness and self.is_free(name) and hasattr(known, "grid") and thickness < known.period / known.grid:

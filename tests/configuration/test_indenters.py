@@ -11,7 +11,7 @@ from icha.planning.results import campaign_files
 from icha.surfaces.shapes import Cone, CylinderPunch, FlatPunch, Paraboloid, Sphere, Wave
 
 BALL = {"kind": "smooth", "side": "200 um", "grid": 64, "shape": {"sphere": {"radius": "1 mm"}}}
-# A study of boundary elements, because the asperity model does not accept layers.
+# A study of boundary elements, because the asperity model does not accept shapes and layers.
 BY_CELLS = {"studies.one.models": ["boundary_elements"]}
 
 
@@ -20,9 +20,10 @@ def paths(campaign):
 
 
 def test_a_smooth_surface_has_neither_seeds_nor_slopes(load):
-    alone = {"surfaces.ball": BALL, "studies.one.surfaces": ["ball"], "studies.one.rms_slopes": None}
-    assert paths(load(alone).campaign) == ["one/ball/seed0/slope0/soft"]
-    campaign = load({"surfaces.ball": BALL, "studies.one.surfaces": ["ball", "rough"]}).campaign
+    ball = BY_CELLS | {"surfaces.ball": BALL}
+    alone = ball | {"studies.one.surfaces": ["ball"], "studies.one.rms_slopes": None}
+    assert paths(load(alone).campaign) == ["one/ball/seed0/slope0/boundary_elements/soft"]
+    campaign = load(ball | {"studies.one.surfaces": ["ball", "rough"]}).campaign
     assert surface_cases(campaign) == [("ball", 0), ("rough", 1), ("rough", 2)]
     assert len(paths(campaign)) == 1 + 2 * 2
     assert campaign.is_free("ball") and campaign.period("ball") == 200e-6
@@ -58,7 +59,7 @@ def test_rough_surfaces_beside_smooth_ones_need_slopes(refused):
     ids=lambda each: next(iter(each)) if isinstance(each, dict) else "",
 )
 def test_a_shape_is_read_with_its_units_and_makes_the_surface_free(section, shape, load):
-    campaign = load({"surfaces.rough.shape": section}).campaign
+    campaign = load(BY_CELLS | {"surfaces.rough.shape": section}).campaign
     found = campaign.surfaces["rough"].shape.shape
     assert type(found) is type(shape)
     for name, value in vars(shape).items():
@@ -167,7 +168,7 @@ def test_a_contact_smaller_than_that_of_pull_off_is_refused(refused, load):
     """A smooth sphere jumps from no contact to a larger one: it pulls off from 110 um."""
     ball = {**BALL, "side": "500 um", "shape": {"sphere": {"radius": "5 mm"}}}
     sticky = {"contact_modulus": "2.667 MPa", "surface_energy": "40 mJ/m^2", "interaction_range": "1 nm"}
-    changes = {
+    changes = BY_CELLS | {
         "surfaces.ball": ball,
         "materials.sticky": sticky,
         "studies.one.surfaces": ["ball"],
@@ -177,3 +178,8 @@ def test_a_contact_smaller_than_that_of_pull_off_is_refused(refused, load):
     small = changes | {"studies.one.targets": {"contact_radii": ["60 um", "140 um"]}}
     refused("", small, "of 'sticky' on 'ball', which pulls off from a contact radius of 110 um")
     load(changes | {"studies.one.targets": {"contact_radii": ["120 um", "140 um"]}})
+
+
+def test_asperities_refuse_shapes(refused):
+    changes = {"surfaces.rough.shape": {"sphere": {"radius": "1 mm"}}}
+    refused("", changes, "'rough' has a shape; expected [boundary_elements]")

@@ -30,7 +30,7 @@ def test_measurements(load, tmp_path):
 
 def test_beside_a_shape_pressures_need_no_slope_and_reduced_pressures_do(load, tmp_path):
     (tmp_path / "points.csv").write_text("p, a\n1, 1\n")
-    shape = {"surfaces.rough.shape": {"sphere": {"radius": "1 mm"}}}
+    shape = {"surfaces.rough.shape": {"sphere": {"radius": "1 mm"}}, "studies.one.models": ["boundary_elements"]}
     assert load(shape | {"measurements": {"lab": _measurement(rms_slope=None)}}).campaign.measurements
     reduced = _measurement(rms_slope=None, load={"column": "p", "unit": "1"})
     assert load({"measurements": {"lab": reduced}}).campaign.measurements

@@ -98,6 +98,7 @@ def test_waves_of_shapes(load, refused):
     assert "grid" not in stated(load(BARE | coarse | {"surfaces.rough": coarse["surfaces.rough"] | {"grid": 320}}))
     # The waves of the shape of a rough indenter count too.
     rough = {"surfaces.rough.shape": {"wave": wave}, "surfaces.rough.short_wavelength": "6 um"}
+    rough |= {"studies.one.models": ["boundary_elements"]}
     refused("", rough | {"surfaces.rough.grid": 70}, "surfaces.rough.grid: 70 is unusual (3.5 cells per shortest wave)")
 
 

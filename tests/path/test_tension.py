@@ -9,39 +9,32 @@ from icha.references import indentation
 RADIUS, MODULUS, ENERGY = 1e-3, 2.7e6, 0.05
 PULL_OFF = 1.5 * np.pi * ENERGY * RADIUS
 MATERIAL = icha.Material(contact_modulus=MODULUS, surface_energy=ENERGY, interaction_range=2e-9)
-# Relative error of the radius, and error of the indentation in (Δγ² R/E*²)^(1/3), here 0.7 µm. The grid has four cells
-# per (Δγ R²/E*)^(1/3).
-TOLERANCES = {"asperities": (1e-6, 1e-6), "boundary_elements": (1e-2, 4e-2)}
-MODELS = pytest.mark.parametrize("model", TOLERANCES)
 
 
 def sphere():
     return icha.Surface(np.zeros((64, 64)), period=400e-6, boundary="free", shape=icha.Sphere(RADIUS))
 
 
-def simulate(model, forces, **options):
-    return icha.simulate(sphere(), MATERIAL, icha.Path(forces=forces, **options), model=model)
+def simulate(**path):
+    return icha.simulate(sphere(), MATERIAL, icha.Path(**path), model="boundary_elements")
 
 
-@MODELS
-def test_a_sphere_at_zero_load_and_in_tension_has_the_radius_and_indentation_of_jkr(model):
+def test_a_sphere_at_zero_load_and_in_tension_has_the_radius_and_indentation_of_jkr():
     """The first force is inside the jump into contact, which ends at -8/9 of the pull-off force."""
     forces = [-0.9 * PULL_OFF, -0.1e-3, 0.0, 0.2e-3]
-    run = simulate(model, forces)
+    run = simulate(forces=forces)
     assert "failed_checks" not in run.attrs and run["step_target"].values.tolist() == forces
     np.testing.assert_allclose(run["force"], forces, rtol=2e-6, atol=1e-9)
     radius = indentation.sphere_radius_at_force(np.array(forces), RADIUS, MODULUS, ENERGY)
     expected = indentation.sphere_contact(radius, RADIUS, MODULUS, ENERGY).indentation
-    of_radius, of_indentation = TOLERANCES[model]
-    unit = np.cbrt(ENERGY**2 * RADIUS / MODULUS**2)
-    np.testing.assert_allclose(run["contact_radius"], radius, rtol=of_radius)
-    np.testing.assert_allclose(run["indentation"], expected, atol=of_indentation * unit)
+    # The grid has four cells per (Δγ R²/E*)^(1/3).
+    np.testing.assert_allclose(run["contact_radius"], radius, rtol=1e-2)
+    np.testing.assert_allclose(run["indentation"], expected, atol=4e-2 * np.cbrt(ENERGY**2 * RADIUS / MODULUS**2))
 
 
-@MODELS
-def test_unloading_meets_the_same_tensions_again(model):
+def test_unloading_meets_the_same_tensions_again():
     forces = [-0.9 * PULL_OFF, 0.0, 0.2e-3]
-    run = simulate(model, forces, unload=True)
+    run = simulate(forces=forces, unload=True)
     assert "failed_checks" not in run.attrs
     met = [k for k, kind in enumerate(run["step_kind"].values) if kind == "force"]
     assert run["step_target"].values[met].tolist() == [*forces, *forces[-2::-1]]
@@ -51,7 +44,7 @@ def test_unloading_meets_the_same_tensions_again(model):
     )
 
 
-@MODELS
+@pytest.mark.parametrize("model", ["asperities", "boundary_elements"])
 def test_tensions_on_a_rough_surface_lie_where_the_load_of_the_first_loading_rises_to_them(model):
     spectrum = icha.SelfAffineSpectrum(
         period=100e-6, rolloff_wavelength=50e-6, short_wavelength=25e-6, hurst=0.8, rms_slope=0.3
@@ -68,7 +61,6 @@ def test_tensions_on_a_rough_surface_lie_where_the_load_of_the_first_loading_ris
         assert area[after - 1] <= run["contact_area_fraction"][k] <= area[after]
 
 
-@MODELS
 @pytest.mark.parametrize(
     ("path", "reason"),
     [
@@ -78,9 +70,9 @@ def test_tensions_on_a_rough_surface_lie_where_the_load_of_the_first_loading_ris
     ],
     ids=["force", "indentation", "target"],
 )
-def test_tension_beyond_pull_off_ends_a_path_by_physics_in_units_of_an_indenter(model, path, reason):
+def test_tension_beyond_pull_off_ends_a_path_by_physics_in_units_of_an_indenter(path, reason):
     with pytest.raises(icha.ConvergenceError, match=f"at an indentation of .*{reason}") as caught:
-        icha.simulate(sphere(), MATERIAL, icha.Path(**path), model=model)
+        simulate(**path)
     ended = caught.value.dataset
     assert "beyond_model" in ended.attrs and "incomplete" not in ended.attrs
     assert float(ended["force"][ended["step_target"].values == 2e-4][0]) == pytest.approx(2e-4, rel=2e-6)
@@ -96,15 +88,13 @@ def test_without_adhesion_no_contact_has_a_load_of_zero_or_less():
         icha.simulate(sphere(), bare, turns)
 
 
-@MODELS
-def test_loading_reaches_a_contact_inside_the_jump_only_before_pull_off(model):
+def test_loading_reaches_a_contact_inside_the_jump_only_before_pull_off():
     """Beyond the largest tension of the branch after the jump, the surfaces would be pulled off."""
     smallest = float(indentation.sphere_pull_off(RADIUS, MODULUS, ENERGY).contact_radius)
     for radius, reached in ((0.9 * smallest, False), (1.08 * smallest, True)):
-        path = icha.Path(contact_radii=[radius], unload=True)
         if reached:
-            run = icha.simulate(sphere(), MATERIAL, path, model=model)
+            run = simulate(contact_radii=[radius], unload=True)
             assert float(run["pull_off_force"]) == pytest.approx(PULL_OFF, rel=1e-2)
         else:
             with pytest.raises(icha.ConvergenceError, match="does not reach back to the target before pull-off"):
-                icha.simulate(sphere(), MATERIAL, path, model=model)
+                simulate(contact_radii=[radius], unload=True)

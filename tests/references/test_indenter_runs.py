@@ -18,7 +18,6 @@ from icha.references.indenter_runs import (
     reason_without_fit,
     spaced_states,
 )
-from icha.simulation import asperity_applicability
 from icha.surfaces.shapes import Cone, Paraboloid, Sphere, describe_shape
 
 SIDE, MODULUS, RADIUS, ENERGY = 64e-6, 1e6, 1e-3, 0.05
@@ -141,27 +140,25 @@ def test_descriptions_of_shapes():
     assert describe_shape(Cone(1.5)) == "cone of half angle 1.5 rad"
 
 
-@pytest.mark.parametrize("model", ["asperities", "boundary_elements"])
-def test_run_of_a_smooth_sphere_has_the_values_of_jkr(model):
+def test_run_of_a_smooth_sphere_has_the_values_of_jkr():
     energy = (4e-6) ** 3 * MODULUS / RADIUS**2  # four cells for (dgamma R^2/E*)^(1/3)
     material = icha.Material(MODULUS, energy, 1e-12)
-    run = icha.simulate(SMOOTH, material, icha.Path(contact_radii=[9e-6], unload=True), model=model)
+    run = icha.simulate(SMOOTH, material, icha.Path(contact_radii=[9e-6], unload=True), model="boundary_elements")
     assert "failed_checks" not in run.attrs and run.attrs["applicability"] == ""
     assert str(run["shape"].values) == "sphere of radius 0.001 m" and run["shape_radius"] == RADIUS
     assert np.isinf(run["layer_thickness"]) and sphere_of(run) == (RADIUS, MODULUS, energy)
     # Boundary elements with few cells are accurate to a few per cent.
-    accuracy = 1e-9 if model == "asperities" else 0.03
+    accuracy = 0.03
     assert float(run["pull_off_force_over_jkr"]) == pytest.approx(1, abs=accuracy)
     assert float(run["work_of_adhesion_approach"]) == pytest.approx(energy, rel=2 * accuracy)
     assert float(run["work_of_adhesion_retraction"]) == pytest.approx(energy, rel=2 * accuracy)
     np.testing.assert_allclose(run["force"], run["nominal_pressure"] * SIDE**2)
     np.testing.assert_array_equal(run["indentation"], -run["mean_separation"])
     assert np.all(run["edge_contact"] == 0)
-    if model == "boundary_elements":
-        touching = run["contact_radius"].values > 0
-        excess = (run["hull_radius"] - run["contact_radius"]).values[touching] / SMOOTH.spacing
-        assert np.all(run["hull_radius"].values[~touching] == 0)
-        assert 0 < excess.min() and excess.max() < 1
+    touching = run["contact_radius"].values > 0
+    excess = (run["hull_radius"] - run["contact_radius"]).values[touching] / SMOOTH.spacing
+    assert np.all(run["hull_radius"].values[~touching] == 0)
+    assert 0 < excess.min() and excess.max() < 1
 
 
 def test_contact_at_the_edges_of_a_scan_is_said():
@@ -193,25 +190,9 @@ def test_target_that_the_first_jump_passes_does_not_fail_checks():
     assert "failed_checks" not in run.attrs
 
 
-@pytest.mark.parametrize("rms", [0.06, 0.19, 0.64])
-def test_asperities_are_not_applicable_to_conformal_roughness(rms):
-    """Full contact has a lower energy than separated surfaces."""
-    energy = (6e-6) ** 3 * MODULUS / RADIUS**2
-    unit = (energy**2 * RADIUS / MODULUS**2) ** (1 / 3)
-    spectrum = icha.SelfAffineSpectrum(
-        period=96e-6, rolloff_wavelength=24e-6, short_wavelength=8e-6, hurst=0.8, rms_slope=0.1
-    )
-    heights = spectrum.realise(grid=96, seed=2).heights
-    surface = icha.Surface(heights / heights.std() * rms * unit, 96e-6, "free", Sphere(RADIUS))
-    material = icha.Material(MODULUS, energy, 1e-12)
-    run = icha.simulate(surface, material, icha.Path(contact_radii=[1.1e-5]), model="asperities")
-    assert "asperity model not applicable: the elastic body conforms" in run.attrs["applicability"]
-
-
-def test_asperities_under_a_shape_need_roughness_that_stays_apart():
-    assert asperity_applicability(1.5) == ""
-    assert "less than 2" in asperity_applicability(1.5, conformal=True)
-    assert asperity_applicability(2.5, conformal=True) == ""
+def test_asperities_refuse_shapes():
+    with pytest.raises(ValueError, match=r"shape: the asperity model is only for nominally flat surfaces"):
+        icha.simulate(SMOOTH, icha.Material(MODULUS, 0.0, 1e-9), icha.Path(forces=[1e-6]))
 
 
 def test_runs_on_layers_have_their_thickness_and_nothing_is_compared_with_jkr():
