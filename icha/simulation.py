@@ -208,7 +208,8 @@ def _compute(solver, surface, material, path, model, seed, progress, kept):
         # Nominal tension if all summits had their pull-off force at the same time, Pa.
         radii = float(np.sum(contact.asperities.radius_of_curvature))
         summits_pull = 1.5 * np.pi * material.surface_energy * radii / contact.area
-        loop = summarise_loop(record.steps, pull_off, material, summits_pull, record.unattributed)
+        least_area = 1 / surface.grid**2 if MODELS[model].by_cells else 0.0
+        loop = summarise_loop(record.steps, pull_off, material, summits_pull, record.unattributed, least_area)
         loop["uphill_jump_in_count"] = _count_uphill_jumps_in(record)
         measured = loop_values(record.steps, loop, surface, material) if surface.free else {}
         dataset = dataset.assign(describe_variables(LOOP | INDENTER, loop | measured))

@@ -234,8 +234,12 @@ def summarise_loop(
     material: Material,
     summit_pull_off_pressure: float,
     unattributed: float,
+    least_area: float,
 ) -> dict[str, float]:
-    """Return pull-off, detachment (last state with contact), losses and maxima of a loop that ends without contact.
+    """Return pull-off, detachment, losses and maxima of a loop that ends without contact.
+
+    Detachment is the last state with contact. With boundary elements, the last contact shrinks through smaller and
+    smaller parts of a cell, which mean nothing; so contacts smaller than a cell do not count.
 
     Parameters
     ----------
@@ -244,9 +248,11 @@ def summarise_loop(
     material : material of the contact; ratios to the adhesion of the material are 0 if it has no adhesion.
     summit_pull_off_pressure : nominal tension if all summits had their pull-off force at the same time, Pa.
     unattributed : loss that is not attributed to any kind of event, J/m^2.
+    least_area : smallest contact area fraction of a state that counts as contact.
     """
     last, adhesive = rows[-1], material.surface_energy > 0
-    touching = rows[max((k for k, row in enumerate(rows) if row["spot_count"]), default=0)]
+    contacts = (k for k, row in enumerate(rows) if row["spot_count"] and row["contact_area_fraction"] >= least_area)
+    touching = rows[max(contacts, default=0)]
     tension = max(0.0, -rows[pull_off_row]["nominal_pressure"])
     # No energy is stored at the start and at the end of the loop, so the whole work is lost.
     loss = last["work"]
