@@ -2,19 +2,8 @@
 
 With the same program, environment and kind of processor, the files of a rerun are identical byte for byte. On another
 processor, the last digits of sums and Fourier transforms differ, and these differences grow in later computations.
-Therefore two numbers count as equal within a tolerance:
-
-- Two numbers are equal if their difference is at most `TOLERANCE` times the larger number.
-- Two values smaller than `FLOOR` times the largest value of the variable are equal if their difference is at most
-  `TOLERANCE` times `FLOOR` times this largest value. A value near zero is often a difference of large values, and then
-  has the absolute error of the large values.
-- Two residuals of a solver are equal if they differ by at most the largest residual that the solver accepts (`NOISE`),
-  because all digits of a residual are rounding errors.
-
-Everything else must be equal: integers, text, positions of missing values, dimensions, types, attributes. Storage
-(chunks, compression, order in the file) is not compared. Figures and the report show the compared values. Figures may
-differ because other machines have other fonts and libraries. If only figures or the report differ, the comparison
-prints a remark, and the results still count as reproduced.
+Therefore numbers count as equal within a tolerance. Everything else must be equal: integers, text, positions of missing
+values, dimensions, types, attributes. Storage (chunks, compression, order in the file) is not compared.
 """
 
 import os
@@ -34,11 +23,14 @@ from icha.support.formatting import format_count, printable
 from icha.support.input_files import refuse_traps
 
 IDENTICAL, WITHIN, DIFFERENT = "identical", "within tolerance", "different"
-TOLERANCE = 1e-6
-FLOOR = 1e-6
-# Largest absolute differences that are within tolerance, by the name of the variable.
+# Largest difference of two equal numbers, divided by the larger number. Numbers smaller than `FLOOR` times the largest
+# number of the variable are divided by this limit instead: they are often differences of large numbers, and then have
+# the absolute error of the large ones.
+TOLERANCE, FLOOR = 1e-6, 1e-6
+# Largest absolute differences within tolerance, by variable: all digits of a residual are rounding errors.
 NOISE = {"residual": RESIDUAL_LIMIT, "gap_residual": RESIDUAL_LIMIT, "front_residual": FRONT_LIMIT}
-# Endings of the names of files that are drawn or written from the data. Their differences count only as remarks.
+# Endings of files that only show results of other files. Their differences count as remarks, because other machines
+# have other fonts and libraries.
 _DERIVED = (".png", ".pdf", ".html", "checks.json")
 # Largest number of variables that the text of a comparison lists.
 _MOST_LINES = 20
@@ -52,7 +44,7 @@ class Difference(NamedTuple):
     Attributes
     ----------
     path : path of the file.
-    name : name of the variable, group or dimension that differs; "" if the file as a whole differs.
+    name : name of the variable or group that differs; "" if the file as a whole differs.
     verdict : `WITHIN` or `DIFFERENT`.
     detail : description of the difference; first the value in the deposit, then the value in the rerun.
     deviation : largest relative difference of the numbers; infinite if something else differs.

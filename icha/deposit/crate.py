@@ -38,74 +38,49 @@ def write_crate(
     shown = [path for path in sorted(sizes) if not path.startswith(_PROGRAM) or path == _LICENCE]
     authors = [_author(author) for author in publication.authors]
     licence = find_licence(publication.license)
-    entities = [
-        {
-            "@id": CRATE,
-            "@type": "CreativeWork",
-            "conformsTo": {"@id": _VERSION},
-            "about": {"@id": "./"},
-        },
-        {
-            "@id": "./",
-            "@type": "Dataset",
-            "name": publication.title,
-            "alternateName": f"{campaign}-{publication.version}",
-            "description": publication.summary,
-            "datePublished": publication.date,
-            "version": publication.version,
-            "keywords": publication.keywords,
-            "identifier": publication.doi and web_address(publication.doi),
-            "license": {"@id": licence.address},
-            "author": [{"@id": author["@id"]} for author, *_ in authors],
-            "citation": {"@id": MODEL_PAPER.address},
-            "hasPart": [{"@id": _PROGRAM}, *_files(shown)],
-            "mentions": {"@id": "#campaign"},
-        },
-        {
-            "@id": licence.address,
-            "@type": "CreativeWork",
-            "name": licence.name,
-            "identifier": licence.identifier,
-        },
-        *(entity for each in authors for entity in each),
-        {"@id": MODEL_PAPER.address, "@type": "ScholarlyArticle", "name": MODEL_PAPER.line},
-        {
-            "@id": _PROGRAM,
-            "@type": ["Dataset", "SoftwareApplication"],
-            "name": "ICHA: adhesive rough contact by interacting and coalescing asperities",
-            "description": "Source of the program that computed the results, and versions of all packages (uv.lock).",
-            "version": revision,
-            "license": {"@id": _LICENCE},
-            "softwareRequirements": "Python",
-        },
-        {
-            "@id": "#campaign",
-            "@type": "CreateAction",
-            "name": f"Campaign {campaign}",
-            "description": "The program in source/ computed the results from the configuration and the inputs.",
-            "instrument": {"@id": _PROGRAM},
-            "object": _files(path for path in shown if path == CONFIGURATION or path.startswith(f"{INPUTS}/")),
-            "result": _files(path for path in shown if path.split("/")[0] in COMPUTED),
-        },
-        *(
-            {
-                "@id": quote(path),
-                "@type": "File",
-                "name": path,
-                "contentSize": str(sizes[path]),
-                "encodingFormat": TABLES["formats"].get(Path(path).suffix, "application/octet-stream"),
-            }
-            for path in shown
-        ),
-    ]
-    # Authors from the same institution share one entity. A list with one entry is written as this entry.
-    graph = {
-        entity["@id"]: {
-            key: value[0] if isinstance(value, list) and len(value) == 1 else value
-            for key, value in without_empty(entity).items()
-        }
-        for entity in entities
+    describes = {"conformsTo": {"@id": _VERSION}, "about": {"@id": "./"}}
+    root = {
+        "name": publication.title,
+        "alternateName": f"{campaign}-{publication.version}",
+        "description": publication.summary,
+        "datePublished": publication.date,
+        "version": publication.version,
+        "keywords": publication.keywords,
+        "identifier": publication.doi and web_address(publication.doi),
+        "license": {"@id": licence.address},
+        "author": [{"@id": author["@id"]} for author, *_ in authors],
+        "citation": {"@id": MODEL_PAPER.address},
+        "hasPart": [{"@id": _PROGRAM}, *_files(shown)],
+        "mentions": {"@id": "#campaign"},
     }
+    program = {
+        "name": "ICHA: adhesive rough contact by interacting and coalescing asperities",
+        "description": "Source of the program that computed the results, and versions of all packages (uv.lock).",
+        "version": revision,
+        "license": {"@id": _LICENCE},
+        "softwareRequirements": "Python",
+    }
+    origin = {
+        "name": f"Campaign {campaign}",
+        "description": "The program in source/ computed the results from the configuration and the inputs.",
+        "instrument": {"@id": _PROGRAM},
+        "object": _files(path for path in shown if path == CONFIGURATION or path.startswith(f"{INPUTS}/")),
+        "result": _files(path for path in shown if path.split("/")[0] in COMPUTED),
+    }
+    entities = [
+        _entity(CRATE, "CreativeWork", **describes),
+        _entity("./", "Dataset", **root),
+        _entity(licence.address, "CreativeWork", name=licence.name, identifier=licence.identifier),
+        *(entity for each in authors for entity in each),
+        _entity(MODEL_PAPER.address, "ScholarlyArticle", name=MODEL_PAPER.line),
+        _entity(_PROGRAM, ["Dataset", "SoftwareApplication"], **program),
+        _entity("#campaign", "CreateAction", **origin),
+    ]
+    for path in shown:
+        kind = TABLES["formats"].get(Path(path).suffix, "application/octet-stream")
+        entities.append(_entity(quote(path), "File", name=path, contentSize=str(sizes[path]), encodingFormat=kind))
+    # Authors from the same institution share one entity.
+    graph = {entity["@id"]: entity for entity in entities}
     content = {"@context": f"{_VERSION}/context", "@graph": list(graph.values())}
     (folder / CRATE).write_text(f"{json.dumps(content, indent=1, ensure_ascii=False)}\n", encoding="utf-8")
 
@@ -113,23 +88,25 @@ def write_crate(
 def _author(author: Author) -> list[dict[str, Any]]:
     """Return the entity of an author, followed by the entity of the author's institution."""
     institution = author.affiliation if author.is_person else author.name
-    organisation = {
-        "@id": author.ror or f"#organisation/{quote(institution or '')}",
-        "@type": "Organization",
-        "name": institution,
-        "url": author.ror,
-    }
+    key = author.ror or f"#organisation/{quote(institution or '')}"
+    organisation = _entity(key, "Organization", name=institution, url=author.ror)
     if not author.is_person:
         return [organisation]
-    person = {
-        "@id": author.orcid_address or f"#person/{quote(author.full_name)}",
-        "@type": "Person",
-        "name": author.full_name,
-        "givenName": author.given_names,
-        "familyName": author.family_names,
-        "affiliation": institution and {"@id": organisation["@id"]},
-    }
+    person = _entity(
+        author.orcid_address or f"#person/{quote(author.full_name)}",
+        "Person",
+        name=author.full_name,
+        givenName=author.given_names,
+        familyName=author.family_names,
+        affiliation=institution and {"@id": key},
+    )
     return [person, organisation] if institution else [person]
+
+
+def _entity(key: str, kind: str | list[str], **properties: Any) -> dict[str, Any]:
+    """Return an entity without empty properties; a list with one entry is written as this entry."""
+    filled = without_empty({"@id": key, "@type": kind, **properties})
+    return {name: value[0] if isinstance(value, list) and len(value) == 1 else value for name, value in filled.items()}
 
 
 def _files(paths: Iterable[str]) -> list[dict[str, str]]:

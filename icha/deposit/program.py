@@ -61,8 +61,9 @@ def program_source(workflow: str | os.PathLike) -> Source:
                 files[(Path(name) / file.relative_to(top)).as_posix()] = file
     files = dict(sorted(files.items()))
     commit = _git(workflow, "rev-parse", "--verify", "HEAD^{commit}")
-    tracked = _git(workflow, "ls-files", "--error-unmatch", "Snakefile")
-    if commit and tracked and _git(workflow, "status", "--porcelain", "--", *map(str, tops.values())) == "":
+    tracked = (_git(workflow, "ls-files", "-z") or "").split("\0")
+    changes = _git(workflow, "status", "--porcelain", "--untracked-files=no", "--", *map(str, tops.values()))
+    if commit and changes == "" and set(files) <= set(tracked):
         return Source(commit, files)
     sums = "".join(f"{sha256_of(file)}  {name}\n" for name, file in files.items())
     version = importlib.metadata.version("icha")
@@ -81,10 +82,7 @@ def _git(folder: Path, *arguments: str) -> str | None:
 
 
 def refuse_other_environment(workflow: Path) -> None:
-    """Raise ValueError if installed packages differ from the lock file, which the deposit contains.
-
-    `workflow` is the folder of the workflow, with `uv.lock`.
-    """
+    """Raise ValueError if installed packages differ from the lock file `uv.lock` in the folder of the workflow."""
     wrong = version_differences((workflow / "uv.lock").read_text(encoding="utf-8"))
     if wrong:
         listed = "\n".join(f"  {name}: {text}" for name, text in wrong.items())

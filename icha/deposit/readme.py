@@ -57,6 +57,7 @@ def readme(
     cost : expected time and memory for computing the whole campaign.
     """
     publication = campaign.deposit_metadata()
+    tops = {path.split("/")[0] for path in sizes}
     authors = "; ".join(author.sorted_name for author in publication.authors)
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent),
@@ -84,7 +85,7 @@ def readme(
         revision=revision,
         cost=cost,
         addresses={each.identifier: web_address(each.identifier) for each in publication.related_identifiers},
-        parts=_parts(sizes),
+        contents={path: TABLES["contents"][path] for path in TABLES["contents"] if path in tops},
         files=len(sizes),
         size=sum(sizes.values()),
         computed=sum(size for path, size in sizes.items() if path.split("/")[0] in COMPUTED),
@@ -124,21 +125,6 @@ def _outcome(publication: Publication, dataset: xr.DataTree, checks: Sequence[Ch
         "passed": sum(check.passed for check in checks),
         "total": len(checks),
     }
-
-
-def _parts(sizes: Mapping[str, int]) -> list[dict]:
-    """List the parts of the deposit with path, content, number of files, and size in bytes."""
-    grouped: dict[str, list[int]] = {}
-    for path, size in sizes.items():
-        top = path.split("/")[0]
-        grouped.setdefault(top if top in TABLES["contents"] else "", []).append(size)
-    others = ", ".join(sorted(path for path in sizes if path.split("/")[0] not in TABLES["contents"]))
-    rows = [(part if part in sizes else f"{part}/", part, content) for part, content in TABLES["contents"].items()]
-    return [
-        {"path": path, "content": content, "files": len(grouped[part]), "size": sum(grouped[part])}
-        for path, part, content in [*rows, (others, "", "citation, and metadata for Zenodo")]
-        if part in grouped
-    ]
 
 
 def _few(values: Sequence) -> str:

@@ -25,8 +25,6 @@ from icha.support.values import NAME_PATTERN
 SMALLEST = "smallest"
 # Two files in the source of a deposit: one with the version of the program, one with the versions of all packages.
 _PYPROJECT, _LOCK = f"{SOURCE}/pyproject.toml", f"{SOURCE}/uv.lock"
-# Packages that compute or read the numbers of results. All other packages draw, write, check or schedule.
-_COMPUTING = {"finufft", "mugrid", "numpy", "pandas", "scipy", "surfacetopography"}
 # Entries in the folder of a rerun: file with the checksum of SHA256SUMS, and folder for configuration and results.
 _BEGUN, _PROJECT = "rerun-of.sha256", "data"
 _PARTS = dict.fromkeys(("study", "surface", "seed", "slope", "material"), "[^/]+")
@@ -52,8 +50,11 @@ def campaign_name(deposit: Path) -> str:
     return name
 
 
-def other_versions(deposit: Path) -> tuple[list[str], list[str]]:
-    """List packages whose installed versions are not those of the deposit: ICHA and `_COMPUTING`, then all others."""
+def other_versions(deposit: Path) -> list[str]:
+    """List installed packages with other versions than in the lock file of a deposit.
+
+    Raise `RerunError` if another version of ICHA made the deposit, or if the files with versions cannot be read.
+    """
     try:
         made_by = tomllib.loads(read_text(deposit, _PYPROJECT))["project"]["version"]
         found = version_differences(read_text(deposit, _LOCK))
@@ -61,10 +62,12 @@ def other_versions(deposit: Path) -> tuple[list[str], list[str]]:
         raise RerunError(
             f"{_PYPROJECT} or {_LOCK} cannot be read; expected a file with the program's version, and a uv lock file"
         ) from None
-    installed = version("icha")
-    wrong = [f"  icha: {installed} is installed, {made_by} made the deposit"] if made_by != installed else []
-    wrong += [f"  {name}: {text}" for name, text in found.items() if name in _COMPUTING]
-    return wrong, [f"  {name}: {text}" for name, text in found.items() if name not in _COMPUTING]
+    if made_by != version("icha"):
+        raise RerunError(
+            f"icha {version('icha')} is installed, but {made_by} made the deposit; expected the same version. Run "
+            "`make environment` in a clone of this version, or in a copy of the deposit's source"
+        )
+    return [f"  {name}: {text}" for name, text in found.items()]
 
 
 def find_runs(only: Iterable[str], deposit: Path) -> list[str]:

@@ -4,7 +4,6 @@ import hashlib
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
 from urllib.parse import quote, urlsplit
 
 import requests
@@ -18,21 +17,6 @@ _LONGEST = 300
 
 class ZenodoError(Exception):
     """The server refuses a request or cannot be reached; the message gives the reason."""
-
-
-class Draft(NamedTuple):
-    """A draft: a record on Zenodo that is not published yet.
-
-    Attributes
-    ----------
-    number : number of the draft.
-    page : web address of the draft.
-    bucket : path on the server to which files are sent.
-    """
-
-    number: str
-    page: str
-    bucket: str
 
 
 def server_address(address: str) -> str:
@@ -53,41 +37,47 @@ def server_address(address: str) -> str:
     return f"{parts.scheme}://{parts.netloc}"
 
 
-class Zenodo:
-    """A client of a Zenodo server. Every method raises `ZenodoError` if the server refuses a request or fails."""
+class Draft:
+    """A draft on a Zenodo server: a record that is not published yet.
 
-    def __init__(self, address: str, token: str):
-        """Store the address of the server (see `server_address`) and the token; no request is sent."""
-        self.address = server_address(address)
-        self._token = token
+    Every method raises `ZenodoError` if the server refuses a request or fails.
 
-    def create(self) -> Draft:
-        """Make an empty draft on the server and return it."""
-        return self._draft(self._call("POST", "/api/deposit/depositions", json={}))
+    Attributes
+    ----------
+    number, page : number and web address of the draft.
+    """
 
-    def draft(self, number: int) -> Draft:
-        """Return the existing draft with this number."""
-        content = self._call("GET", f"/api/deposit/depositions/{number}")
+    def __init__(self, address: str, token: str, number: int | None = None):
+        """Make an empty draft, or find the draft with a number, on the server at `address` (see `server_address`)."""
+        self.address, self._token, path = address, token, "/api/deposit/depositions"
+        content = self._call("GET", f"{path}/{number}") if number else self._call("POST", path, json={})
         if content.get("submitted") is True:
             raise ZenodoError(
                 f"record {number} is already published. Make a draft of a new version on the page of the record, and "
                 "upload with --draft"
             )
-        return self._draft(content)
+        try:
+            self.number, bucket = int(content["id"]), urlsplit(content["links"]["bucket"])
+        except (KeyError, TypeError, AttributeError, ValueError):
+            raise ZenodoError(f"{address} does not answer like Zenodo: the draft is incomplete") from None
+        if f"{bucket.scheme}://{bucket.netloc}" != address:
+            # The token must not reach another server.
+            raise ZenodoError(f"{address} asks to send files to another server: {self._plain(bucket.geturl())}")
+        self.page, self._bucket, self._path = f"{address}/uploads/{self.number}", bucket.path, f"{path}/{self.number}"
 
-    def describe(self, draft: Draft, metadata: Mapping) -> None:
-        """Set the metadata of a draft; https://developers.zenodo.org/#representation describes the keys."""
-        self._call("PUT", f"/api/deposit/depositions/{quote(draft.number)}", json={"metadata": dict(metadata)})
+    def describe(self, metadata: Mapping) -> None:
+        """Set the metadata of the draft; https://developers.zenodo.org/#representation describes the keys."""
+        self._call("PUT", self._path, json={"metadata": dict(metadata)})
 
-    def upload(self, draft: Draft, path: str | os.PathLike) -> bool:
-        """Send a file to a draft, where it replaces a file with the same name; return whether the server sent its MD5.
+    def upload(self, path: str | os.PathLike) -> bool:
+        """Send a file to the draft, where it replaces a file with the same name.
 
-        Raise `ZenodoError` if the MD5 differs from that of the file.
+        Return whether the server sent an MD5 of the file; raise `ZenodoError` if this MD5 is wrong.
         """
         with open(path, "rb") as file:
             md5 = hashlib.file_digest(file, lambda: hashlib.md5(usedforsecurity=False)).hexdigest()
             file.seek(0)
-            content = self._call("PUT", f"{draft.bucket}/{quote(Path(path).name)}", data=file)
+            content = self._call("PUT", f"{self._bucket}/{quote(Path(path).name)}", data=file)
         received = str(content.get("checksum", "")).removeprefix("md5:").lower()
         if received and received != md5:
             raise ZenodoError(
@@ -95,17 +85,6 @@ class Zenodo:
                 "server. Upload it again"
             )
         return bool(received)
-
-    def _draft(self, content: dict) -> Draft:
-        try:
-            number, bucket = str(content["id"]), urlsplit(content["links"]["bucket"])
-            draft = Draft(number, f"{self.address}/uploads/{quote(number)}", bucket.path)
-        except (KeyError, TypeError, AttributeError, ValueError):
-            raise ZenodoError(f"{self.address} does not answer like Zenodo: the draft is incomplete") from None
-        if f"{bucket.scheme}://{bucket.netloc}" != self.address:
-            # The token must not reach another server.
-            raise ZenodoError(f"{self.address} asks to send files to another server: {self._plain(bucket.geturl())}")
-        return draft
 
     def _authorize(self, request: requests.PreparedRequest) -> requests.PreparedRequest:
         """Add the token to a request. Because this is a function, the token has priority over a file `.netrc`."""

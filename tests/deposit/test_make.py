@@ -4,7 +4,6 @@ import csv
 import getpass
 import json
 import os
-import re
 import shutil
 import subprocess
 import time
@@ -23,7 +22,6 @@ from tiny_campaign import CAMPAIGN as TINY
 from traces import traces
 from typer.testing import CliRunner
 
-from icha.analysis.checks import read_checks
 from icha.cli import app
 from icha.configuration.cases import campaign_sha256
 from icha.configuration.load import collect_inputs, load_configuration
@@ -34,7 +32,6 @@ from icha.deposit import make
 from icha.deposit.dictionary import file_pattern
 from icha.deposit.make import make_deposit, refuse_mixed
 from icha.deposit.program import Source
-from icha.deposit.verify import COMPUTED
 from icha.planning.costs import Cost
 from icha.planning.results import campaign_files, expected_stamps
 from icha.support.checksums import CHECKSUMS, write_checksums
@@ -180,29 +177,6 @@ def test_the_dictionary_has_every_variable_and_no_other(published):
     assert rows["dataset/tiny.nc", "/load", "status"]["flags"].startswith("0: complete, 1: incomplete")
     row = rows[*run, "step_kind"]
     assert (row["type"], row["dimensions"]) == ("text", "step")
-
-
-@pytest.mark.slow
-def test_the_page_for_readers_has_the_numbers(published):
-    page = (published / "README.md").read_text(encoding="utf-8")
-    assert page.startswith("# One file \\| one material\n")
-    for text in (
-        "Carberry, Josiah (2026): One file \\| one material. Version 1.0.0",
-        "| Josiah Carberry | <https://orcid.org/0000-0002-1825-0097> |  |\n",
-        "| load | asperities | plate | 0 | 0.5 | soft | 1 | 1 | 0 |",
-        "| soft | 2.5e+07 | 0.05 | 4e-08 |",
-        yaml.safe_load((published / "CITATION.cff").read_text())["commit"],
-    ):
-        assert text in page, text
-    checks = read_checks(published / "checks.json")
-    assert f"{len(checks)} of {len(checks)} checks passed" in page
-    computed = sum(path.stat().st_size for name, path in files_of(published).items() if name.split("/")[0] in COMPUTED)
-    ((size, unit),) = re.findall(r"The computation needs ([\d.]+) (kB|MB) of", page)
-    assert float(size) * {"kB": 1e3, "MB": 1e6}[unit] == pytest.approx(computed, rel=6e-3)
-    # Every path on the page exists; the copy of the project has no documentation.
-    for path in re.findall(r"`([\w./-]+)`", page):
-        if "/" in path and path != "source/docs/model.md":
-            assert (published / path).exists(), path
 
 
 @pytest.mark.slow

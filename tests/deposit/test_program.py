@@ -62,6 +62,7 @@ def test_the_revision_is_the_commit_or_a_checksum_of_the_files(clone, monkeypatc
         return digest
 
     (clone / "icha/more.py").write_text("TWO = 2\n")
+    (clone / ".git/info/exclude").write_text("more.py\n")
     untracked = checksum()
     (clone / "icha/more.py").write_text("TWO = 3\n")
     assert checksum() != untracked

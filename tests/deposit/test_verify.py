@@ -117,9 +117,8 @@ def test_names_in_a_zip_lead_nowhere_else(name, tmp_path, monkeypatch):
     assert sorted(each.name for each in tmp_path.rglob("*")) == ["a.zip", "temporary"]
 
 
-@pytest.mark.parametrize("mode", [stat.S_IFLNK | 0o777, stat.S_IFCHR | 0o644, stat.S_IFIFO | 0o644])
-def test_links_and_devices_in_a_zip_become_files(mode, tmp_path):
-    (problem,) = problems_with(zipped(tmp_path, **{"tiny/link": mode}))
+def test_links_in_a_zip_become_files(tmp_path):
+    (problem,) = problems_with(zipped(tmp_path, **{"tiny/link": stat.S_IFLNK | 0o777}))
     assert problem.startswith("link: was added")
 
 
@@ -141,10 +140,3 @@ def test_a_large_text_is_not_read_as_a_whole(folder, monkeypatch):
     monkeypatch.setattr(verify, "LARGEST_TEXT", 3)
     with pytest.raises(ValueError, match="expected at most 3 B"):
         read_text(folder, "README.md")
-
-
-def test_no_more_than_a_hundred_problems_are_printed(folder):
-    for k in range(150):
-        (folder / f"added{k}").touch()
-    done = CliRunner().invoke(app, ["verify", str(folder)])
-    assert done.exit_code == 1 and "… and 50 more" in done.output and "damaged: 150 problems" in done.output

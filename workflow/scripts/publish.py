@@ -7,7 +7,7 @@ from job import job_context
 from icha.configuration.load import load_configuration
 from icha.datasets.results import CONFIGURATION
 from icha.deposit.make import make_deposit, refuse_mixed
-from icha.deposit.program import program_source, refuse_other_environment
+from icha.deposit.program import program_source
 from icha.planning.plan import whole_cost
 
 
@@ -21,7 +21,6 @@ def publish(archive, *, results, files, project):
     files : files of the results that the deposit includes.
     project : folder of the workflow.
     """
-    refuse_other_environment(Path(project))
     campaign = load_configuration(Path(results, CONFIGURATION)).campaign
     refuse_mixed(Path(results), campaign)
     make_deposit(
