@@ -184,8 +184,12 @@ def causes_of_runs(runs: xr.Dataset, values: xr.DataArray | None = None, *, of_l
 
 
 def left_out_of_study(study: xr.Dataset, *, of_loss: bool = False) -> LeftOut:
-    """Describe the runs of a study that failed or are missing, or that have no loss if `of_loss`."""
-    causes = causes_of_runs(study, of_loss=of_loss).transpose(*LABELS).values.ravel()
+    """Describe the runs of a study that failed or are missing; if `of_loss`, those with adhesion that have no loss."""
+    causes = causes_of_runs(study, of_loss=of_loss)
+    if of_loss and "hysteresis_loss" in study:
+        causes = causes.where((causes != "") | study["hysteresis_loss"].notnull(), ENDED_EARLY)
+        causes = causes.where(study["surface_energy"] > 0, NOT_REQUESTED)
+    causes = causes.transpose(*LABELS).values.ravel()
     return find_left_out("runs", causes, varied_parameters(study, LABELS))
 
 

@@ -42,7 +42,7 @@ _LEAST_CURVATURE = 0.01
 _LOAD_ERROR, _LEAST_LOAD = 1e-7, 1e-4
 # Relative error of a given mean position that counts as rounding.
 _SAME_MEAN = 1e-12
-_TINY = np.finfo(float).tiny
+_TINY = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True)

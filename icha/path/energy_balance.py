@@ -234,7 +234,7 @@ def summarise_loop(
     material: Material,
     summit_pull_off_pressure: float,
     unattributed: float,
-    least_area: float,
+    least_area: float = 0.0,
 ) -> dict[str, float]:
     """Return pull-off, detachment, losses and maxima of a loop that ends without contact.
 

@@ -116,11 +116,12 @@ ESTIMATED_AT_TARGETS: dict[str, tuple[str, ...]] = {
 }
 # Quantities of a loop whose means are estimated.
 ESTIMATED_OF_LOOPS: tuple[str, ...] = ("pull_off_pressure", "hysteresis_loss")
-# Quantities per nominal area, which mean nothing for one square such as a lens, and further ones for a square. Three of
-# these need adhesion.
+# Quantities per nominal area, which mean nothing for one square such as a lens, and further ones for a square. Some
+# need adhesion.
 PER_NOMINAL_AREA = (*ESTIMATED_AT_TARGETS.keys() - {"spot_count"}, *ESTIMATED_OF_LOOPS)
-OF_ADHESION = ("loss_over_contact", "work_of_adhesion_approach", "work_of_adhesion_retraction")
-OF_SQUARES = ("contact_radius", "stiffness", "force", "pull_off_force", *OF_ADHESION)
+_RATIOS = ("loss_over_contact", "work_of_adhesion_approach", "work_of_adhesion_retraction")
+OF_SQUARES = ("contact_radius", "stiffness", "force", "pull_off_force", *_RATIOS)
+OF_ADHESION = ("pull_off_pressure", "pull_off_force", *_RATIOS)
 ESTIMATED_AT_TARGETS |= {"contact_radius": AREAS, "stiffness": (), "force": LOADS}
 ESTIMATED_OF_LOOPS += tuple(name for name in OF_SQUARES if name not in ESTIMATED_AT_TARGETS)
 # Estimated quantities that may be negative: the load of a contact with adhesion may be a tension.
