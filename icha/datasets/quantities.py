@@ -139,7 +139,9 @@ def plain(symbol: str) -> str:
     return symbol
 
 
+_GREEK = {"gamma": "γ", "delta": "δ", "lambda": "λ", "mu": "µ", "pi": "π"}
 _PLAIN = (
+    (r"\\[,; ]", " "),
     (r"\^?\{?\\ast\}?", "*"),
     (r"′_\{\\mathrm\{(\w+)\}\}", r"'\1"),
     (r"\\mathrm\{(\w+)\}", r"\1"),
@@ -147,7 +149,8 @@ _PLAIN = (
     (r"\\langle u\\rangle", "⟨u⟩"),
     (r"\\sqrt\{(.*)\}", r"√(\1)"),
     (r"\\Delta", "Δ"),
-    (r"\\(gamma|lambda|mu|pi)", lambda found: {"gamma": "γ", "lambda": "λ", "mu": "µ", "pi": "π"}[found[1]]),
+    (r"\\(gamma|delta|lambda|mu|pi)", lambda found: _GREEK[found[1]]),
+    (r"\^\{(\d+/\d+)\}", r"^(\1)"),
     (r"_(\d)", r"\1"),
     (r"[{}]", ""),
 )

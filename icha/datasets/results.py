@@ -19,8 +19,8 @@ SENSITIVITY = "aggregated/sensitivity.nc"
 CHECKS = "checks.json"
 VERDICT = "verdict.txt"
 FIGURE = "figures/{name}.{ending}"
-# A figure as a picture and as a drawing, and its caption.
-FIGURE_ENDINGS = ("png", "pdf", "txt")
+# A figure as a picture and as a drawing, its caption, and what it draws as a table.
+FIGURE_ENDINGS = ("png", "pdf", "txt", "csv")
 REPORT = "report.html"
 EXPLORER = "explore.html"
 CONFIGURATION = "config.used.yaml"

@@ -11,6 +11,7 @@ from icha.contact.models import MODELS, REFERENCE_MODEL
 from icha.datasets.labels import slopes_of
 from icha.datasets.quantities import label_of
 from icha.figures import select
+from icha.figures.drawn import plot, record
 from icha.figures.ensembles import draw_members, lines_handles, mark_fewer
 from icha.figures.looks import (
     ASPERITIES_NAME,
@@ -261,11 +262,12 @@ def _draw_line(axes, line, points, count):
     if len(members) > 1:
         load, values = at_common_loads(members, logarithmic=True)
         if len(load):
-            drawn = draw_members(axes, load, values, line.look, positive=True, asked=asked, curves=count)
+            name = line.runs.drawn_name
+            drawn = draw_members(axes, load, values, line.look, positive=True, name=name, asked=asked, curves=count)
             return np.tile(load, len(drawn)), drawn.ravel()
     # A single run, or several runs without a mean, because these runs have no load in common.
-    for load, values in members:
-        axes.plot(load, values, **line.look)
+    for (load, values), name in zip(members, line.runs.names_of_seeds.values(), strict=True):
+        plot(axes, load, values, name, **line.look)
         if len(members) < asked:
             mark_fewer(axes, load, values, np.isfinite(values)[None], line.look, asked)
     return tuple(map(np.concatenate, zip(*members, strict=True)))
@@ -277,6 +279,7 @@ def _draw_crosses(axes, line, points):
 
     load, values = at_common_loads([points(run) for run in line.stops.values()], logarithmic=True)
     mean = values.mean(axis=0)
+    record(axes, load, mean, line.runs.drawn_name, seeds=len(values))
     axes.plot(load, mean, **line.look)
     mark_fewer(axes, load, mean, np.isfinite(values), line.look, line.runs.asked)
     return load, mean
@@ -284,9 +287,11 @@ def _draw_crosses(axes, line, points):
 
 def _draw_unloading(panels, line):
     """For every run of a line, draw the unloading at compressive loads; the limits of the axes do not change."""
-    for leg in [leg for run in line.runs.by_seed.values() for leg in select.unloading_legs(run)]:
+    names = line.runs.names_of_seeds
+    for name, leg in [(names[k], leg) for k, run in line.runs.by_seed.items() for leg in select.unloading_legs(run)]:
         for axes, points in panels.items():
             load, values = points(leg)
+            record(axes, load, values, name._replace(curve=f"{name.curve}, unloading"))
             # Loads just before separation are arbitrarily small, so the line must not affect the limits of the axes.
             pressed = np.where(load > 0, load, np.nan)
             axes.add_artist(legend_handle(pressed, values, color=line.look["mec"], **_UNLOADING))

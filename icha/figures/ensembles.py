@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.analysis.left_out import too_few
+from icha.datasets.labels import RunLabels
+from icha.figures.drawn import Name, record
 from icha.figures.looks import FEWER_SEEDS
 from icha.figures.select import ContactRuns
 from icha.figures.style import GREY, legend_handle
@@ -35,6 +37,7 @@ def draw_members(
     look: dict,
     *,
     positive: bool,
+    name: Name,
     asked: int = 0,
     curves: int = 1,
 ) -> np.ndarray:
@@ -48,13 +51,17 @@ def draw_members(
     members : (members, k) float, values of every member; NaN where a member has no value.
     look : arguments of `Axes.plot` for the line.
     positive : True for a logarithmic axis; the confidence band is then positive, and zeros are left out.
+    name : name of the curve in the table of the figure.
     asked : number of requested members; markers of means over fewer members are crossed out.
     curves : number of curves in the panel; with many curves, few members are not drawn.
     """
     mean, known = ensemble(members).mean, np.isfinite(members)
     scattered = len(members) > 1 and (len(members) >= ENOUGH or curves <= MOST_SCATTERED)
+    ends = np.full((2, len(x)), np.nan)
     if scattered:
-        _draw_scatter(axes, x, members, look["color"], positive=positive, asked=asked)
+        ends = _ends(members, positive=positive, asked=asked)
+        _draw_scatter(axes, x, members, ends, look["color"], positive=positive)
+    record(axes, x, mean, name, low=ends[0], high=ends[1], seeds=known.sum(axis=0))
     every = max(1, -(-len(x) // _MEAN_MARKERS))
     axes.plot(*_break_lines(known, x, mean), **{"lw": 0.9} | look | {"ls": "-", "markevery": every})
     mark_fewer(axes, x, mean, known, look, asked, every)
@@ -87,11 +94,21 @@ def mark_fewer(
         axes.plot(x, np.where(fewer, y, np.nan), markevery=every, **mark, **_CROSS)
 
 
-def _draw_scatter(axes, x, members, colour, *, positive, asked):
-    """Draw a confidence band, or every member if members are few; the band does not change the limits of the axes.
+def _ends(members, *, positive, asked):
+    """Return both ends of the confidence interval of the means, or of the range of few members; NaN for one member.
 
-    There is no band where too many of the `asked` members are missing.
+    There is no interval where too many of the `asked` members are missing.
     """
+    over = ensemble(members)
+    few = (over.count > 1) & (over.count < ENOUGH)
+    ends = np.where(too_few(over.count, asked), np.nan, over.band(positive=positive))
+    if few.any():
+        ends[:, few] = np.nanmin(members[:, few], axis=0), np.nanmax(members[:, few], axis=0)
+    return np.where(over.count > 1, ends, np.nan)
+
+
+def _draw_scatter(axes, x, members, ends, colour, *, positive):
+    """Draw a confidence band, or every member if members are few; the band does not change the limits of the axes."""
     over = ensemble(members)
     if over.count.min(initial=len(members)) < ENOUGH:
         # A line with a single point would be invisible.
@@ -100,8 +117,7 @@ def _draw_scatter(axes, x, members, colour, *, positive, asked):
             axes.plot(x, np.where(member > 0, member, np.nan) if positive else member, color=colour, **look)
         return
     limits = axes.dataLim.frozen()
-    stated = ~too_few(over.count, asked)
-    band = _break_lines(np.isfinite(members), x, *np.where(stated, over.band(positive=positive), np.nan))
+    band = _break_lines(np.isfinite(members), x, *ends)
     axes.fill_between(*band, color=colour, alpha=0.18, lw=0, zorder=1.5)
     axes.dataLim.set(limits)
 
@@ -136,7 +152,15 @@ def join_bins(edges: np.ndarray, contents: np.ndarray, least: float) -> tuple[np
 
 
 def draw_points(
-    axes: Axes, x: np.ndarray, members: np.ndarray, look: dict, *, positive: bool, asked: int | np.ndarray = 0
+    axes: Axes,
+    x: np.ndarray,
+    members: np.ndarray,
+    look: dict,
+    *,
+    positive: bool,
+    name: Name,
+    asked: int | np.ndarray = 0,
+    shift: float = 1.0,
 ) -> ErrorbarContainer:
     """Draw the means of an ensemble as points with confidence bars, or for few members with bars of their range.
 
@@ -147,15 +171,15 @@ def draw_points(
     x : (k,) or (members, k) float, positions on the x axis.
     members : (members, k) float, values of every member; NaN where a member has no value.
     positive : True if the values are positive; both ends of the bars are then positive too.
+    name : name of the curve in the table of the figure.
     asked : number of requested members, for all points or for each; a mean over fewer members has a crossed-out marker.
+    shift : factor of the drawn positions, so that points at one position are side by side.
     """
     known, over = np.isfinite(members), ensemble(members)
-    x = np.where(known, x, np.nan)
-    several, few = over.count > 1, (over.count > 1) & (over.count < ENOUGH)
-    ends = np.where(too_few(over.count, asked), np.nan, over.band(positive=positive))
-    if few.any():
-        ends[:, few] = np.nanmin(members[:, few], axis=0), np.nanmax(members[:, few], axis=0)
-    x, bars = ensemble(x).mean, np.where(several, [over.mean - ends[0], ends[1] - over.mean], np.nan)
+    several, ends = over.count > 1, _ends(members, positive=positive, asked=asked)
+    x = ensemble(np.where(known, x, np.nan)).mean
+    record(axes, x, over.mean, name, low=ends[0], high=ends[1], seeds=over.count)
+    x, bars = shift * x, np.array([over.mean - ends[0], ends[1] - over.mean])
     *points, below, above = _break_lines(known, x, over.mean, *bars)
     bars = {"yerr": [below, above] if several.any() else None, "elinewidth": 0.6, "capsize": 1.5}
     handle = axes.errorbar(*points, **bars | look)
@@ -192,7 +216,14 @@ class Points:
         order = np.argsort(ensemble(members[0]).mean, kind="stable")
         self.members = members[..., order]
         self.same_seeds = bool(common)
-        self.asked = np.array([group.asked for group in groups])[order]
+        self._groups = groups
+
+    @property
+    def name(self) -> Name:
+        """Name of the line in the table of a figure, with the labels that all points have in common."""
+        labels = zip(*(group.labels._replace(seed=None) for group in self._groups), strict=True)
+        common = RunLabels(*(each[0] if len({*each}) == 1 else None for each in labels))
+        return Name(self._groups[0].model_name, common)
 
     @property
     def means(self) -> np.ndarray:
@@ -206,8 +237,8 @@ class Points:
 
     def draw(self, axes: Axes, look: dict, quantity: int = 1, *, shift: float = 1.0) -> ErrorbarContainer:
         """Draw the variable with index `quantity` in `quantities` against the first variable, multiplied by `shift`."""
-        x, y = shift * self.members[0], self.members[quantity]
-        return draw_points(axes, x, y, look, positive=True, asked=self.asked)
+        x, y = self.members[0], self.members[quantity]
+        return draw_points(axes, x, y, look, positive=True, name=self.name, asked=self.asked, shift=shift)
 
 
 def lines_handles(counts: Iterable[int]) -> dict[str, Line2D]:

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of
+from icha.figures.drawn import Name
 from icha.figures.ensembles import draw_points, points_handles
 from icha.figures.looks import Contact, Looks, legend_below
 from icha.figures.select import NothingToDraw, compared_seeds, select_errors
@@ -56,11 +58,13 @@ def draw_errors(
             drawn = _different(drawn, names)
         for position, (contact, applicable, errors) in enumerate(drawn):
             look = looks.look(contact, applicable=applicable)
-            loads = errors["reduced_pressure"].values * _APART ** (position - (len(drawn) - 1) / 2)
+            loads, shift = errors["reduced_pressure"].values, _APART ** (position - (len(drawn) - 1) / 2)
+            material, surface, slope = contact
+            labels = RunLabels(study, None, surface, None, slope, material)
+            of_curve = {"name": Name("asperities and boundary elements", labels), "asked": compared_seeds(errors)}
             for ax, name in zip(row, names, strict=True):
                 members = (100 if percent else 1) * errors[name].values
-                asked = compared_seeds(errors)
-                handle = draw_points(ax, loads, members, look, positive=not percent, asked=asked)
+                handle = draw_points(ax, loads, members, look, positive=not percent, shift=shift, **of_curve)
                 counts.update(np.isfinite(members).sum(axis=0).tolist())
             if applicable:
                 named.setdefault(looks.place_name(contact[1:]) if own_rows else looks.name(contact), handle)

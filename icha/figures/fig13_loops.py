@@ -8,9 +8,11 @@ import numpy as np
 
 from icha.contact.model import EVENT_KINDS
 from icha.contact.models import MODELS, REFERENCE_MODEL
+from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of
 from icha.figures import select
 from icha.figures.curves import Axis, physical_units
+from icha.figures.drawn import Name, plot, record
 from icha.figures.looks import (
     BRANCH_DASHES,
     MODEL_MARKERS,
@@ -52,13 +54,13 @@ class _Loop(NamedTuple):
 
     Attributes
     ----------
-    rms_slope : slope of the run.
+    labels : labels of the run.
     run : the run.
     truths : runs with boundary elements on the same topography, with the same material.
     look : arguments of `Axes.plot` for lines and markers.
     """
 
-    rms_slope: float
+    labels: RunLabels
     run: xr.Dataset
     truths: list[xr.Dataset]
     look: dict
@@ -107,10 +109,10 @@ def figure(
             pressure_unit = float(run["contact_modulus"] * run["unit_slope"])
             factors = pressure_unit * pressure.factor, float(run["unit_height"]) * gap.factor
         run, *beside = (_in_units(each, *factors) for each in (run, *beside))
-        drawn.append(_Loop(labels.rms_slope, run, beside, look))
+        drawn.append(_Loop(labels, run, beside, look))
 
     rows = [[slope] for slope in slopes] if own_rows else [slopes]
-    by_row = [[loop for loop in drawn if loop.rms_slope in shown] for shown in rows]
+    by_row = [[loop for loop in drawn if loop.labels.rms_slope in shown] for shown in rows]
     windows = [_small_tensions(loops_of_row) for loops_of_row in by_row]
     columns = 3 if any(windows) else 2
     fig, panels = new_panels(2.7 * len(rows), len(rows), columns)
@@ -131,7 +133,7 @@ def figure(
         left.set_ylabel(pressure.label)
         right.set_ylabel(label_of("contact_area_fraction"))
         if own_rows:
-            right.set_title(slope_label(shown_loops[0].rms_slope), loc="right")
+            right.set_title(slope_label(shown_loops[0].labels.rms_slope), loc="right")
     for ax in panels[-1, :-1]:
         ax.set_xlabel(gap.label)
     panels[-1, -1].set_xlabel(pressure.label)
@@ -155,9 +157,10 @@ def _in_units(run, pressure, separation):
 
 def _draw(ax, loop, names, *, turn):
     """Draw a loop with a marker at pull-off; if `turn` is True, also mark the end of the first loading."""
-    run, colour = loop.run, loop.look["color"]
+    run, colour, words = loop.run, loop.look["color"], select.name_of_model(loop.run)
     for branch, leg in select.branches(run):
         line = _curve(leg) if names == _LOADS else [leg[name].values for name in names]
+        record(ax, *(leg[name].values for name in names), Name(f"{words}, {branch}", loop.labels))
         ax.plot(*line, ls=BRANCH_DASHES[branch], color=colour, **_BRANCHES[branch])
     marked = [(np.flatnonzero(run["leg"] == 0)[-1], {"ls": "none", "zorder": 5})] if turn else []
     if (at := select.pull_off_step(run)) is not None:
@@ -170,7 +173,8 @@ def _draw(ax, loop, names, *, turn):
             look = {"color": colour, "marker": markers[select.name_of_model(truth)], **_TRUTH}
             # The colour is already pale if the asperity model is not applicable.
             look = look if select.is_good_loop(truth) or "label" in loop.look else pale(look, REFERENCE_MODEL)
-            ax.plot(*(states[name] for name in names), markevery=_APART, **look)
+            name = Name(f"{select.name_of_model(truth)}, {branch}", loop.labels._replace(model=REFERENCE_MODEL))
+            plot(ax, *(states[each].values for each in names), name, markevery=_APART, **look)
 
 
 def _curve(leg):

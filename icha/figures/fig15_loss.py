@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.contact.models import REFERENCE_MODEL
+from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import LOSS_PARTS, label_of
 from icha.figures.curves import cross_look
+from icha.figures.drawn import Name, plot, record
 from icha.figures.ensembles import Points, points_handles
 from icha.figures.looks import ASPERITIES_NAME, REFERENCE_NAME, legend_below, looks_of_studies, model_handle, pale
 from icha.figures.select import ContactRuns, NothingToDraw, names_of_models, select_detached_lines
@@ -94,7 +96,15 @@ def _draw_losses(ax, runs, truths, looks):
             along = np.linspace(x.min(), x.max(), _FIT_POINTS)
             values, r_squared, exponent = fit_line(x, y, along)
             words = f": $r^2$ = {r_squared:.4f}, exponent {exponent:.2f}"
-            ax.plot(along, values, color=looks.colour(contact), lw=0.9, zorder=2)
+            plot(
+                ax,
+                along,
+                values,
+                line.name._replace(curve="fitted line"),
+                color=looks.colour(contact),
+                lw=0.9,
+                zorder=2,
+            )
         if not looks.many:
             handles[looks.name(contact) + words] = handle
     means = np.concatenate([line.means for line in drawn.values()], axis=1)
@@ -135,6 +145,8 @@ def _draw_parts(ax, runs, looks):
         above, below = 0.0, 0.0
         for name in shown:
             share = 100 * bar[name]
+            part = Name(label_of(name), RunLabels(None, model, contact[1], None, contact[2], contact[0]))
+            record(ax, [position], [share], part)
             bar_look = {"ec": "black", "lw": 0.4, "alpha": None if applicable else _PALE} | PARTS[name]
             ax.bar(position, share, 0.8, bottom=above if share > 0 else below, **bar_look)
             above, below = above + max(share, 0), below + min(share, 0)

@@ -11,6 +11,7 @@ from icha.contact.model import EVENT_KINDS
 from icha.contact.models import REFERENCE_MODEL
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of
+from icha.figures.drawn import plot
 from icha.figures.looks import BRANCH_DASHES, COARSE_GRID_ALONE, NOT_APPLICABLE_ALONE, legend_below
 from icha.figures.maps import topography_of
 from icha.figures.select import is_good_loop, select_complete_run, unloading_legs
@@ -77,7 +78,7 @@ def _draw_places(ax, topography, events):
         # Rings are larger than dots, and squares larger than crosses, so that both marks at one position are visible.
         ring = 1.6 if name in ("jump_off", "coalescence") else 1.0
         x, y = (events[axis][shown] * topography.length for axis in "xy")
-        (points,) = ax.plot(x, y, **{"ls": "none", "ms": ring * size, "mew": 0.9} | look)
+        points = plot(ax, x, y, words, **{"ls": "none", "ms": ring * size, "mew": 0.9} | look)
         if shown.any():
             handles[f"{words} ({np.count_nonzero(shown)})"] = points
     bar = ax.figure.colorbar(image, ax=ax, shrink=0.9, pad=0.02, aspect=28)
@@ -90,13 +91,22 @@ def _draw_counts(ax, events):
     """Draw the cumulative number of events against the mean separation, by kind of event and branch."""
     from matplotlib.ticker import MaxNLocator
 
-    for name, (_, _, look) in _KINDS.items():
+    for name, (words, _, look) in _KINDS.items():
         width = 0.6 if name in ("coalescence", "split") else 1.3
         for branch, dashes in BRANCH_DASHES.items():
             separation = events["separation"][(events["kind"] == name) & (events["branch"] == branch)]
             if len(separation):
                 steps, counts = np.append(separation[0], separation), np.arange(len(separation) + 1)
-                ax.plot(steps, counts, color=look["mec"], ls=dashes, lw=width, drawstyle="steps-post")
+                plot(
+                    ax,
+                    steps,
+                    counts,
+                    f"{words}, {branch}",
+                    color=look["mec"],
+                    ls=dashes,
+                    lw=width,
+                    drawstyle="steps-post",
+                )
     ax.set_ylim(bottom=0)
     ax.yaxis.set_major_locator(MaxNLocator(integer=True))
     ax.set(xlabel=label_of("reduced_separation"), ylabel="events so far")

@@ -8,6 +8,7 @@ import numpy as np
 
 from icha.datasets.quantities import label_of
 from icha.figures import select
+from icha.figures.drawn import Name, plot
 from icha.figures.indenter_curves import select_series, theory_curves
 from icha.figures.looks import BRANCH_DASHES, legend_below
 from icha.figures.style import BLACK, GREY, in_style, legend_handle, new_panels
@@ -49,12 +50,13 @@ def figure(campaign: xr.DataTree, *, study: str) -> Figure:
         of_sphere = theory_curves(of_panel[0].first_run, 1.5 * largest)
         theories |= of_sphere
         for name, (x, y) in of_sphere.items():
-            ax.plot(x * per_metre, y * per_newton, zorder=1, **_THEORIES[name])
+            plot(ax, x * per_metre, y * per_newton, name, zorder=1, **_THEORIES[name])
         for each in of_panel:
-            for run in each.runs.by_seed.values():
+            for seed, run in each.runs.by_seed.items():
                 for branch, leg in select.branches(run):
+                    name = Name(branch, each.runs.labels._replace(seed=seed))
                     x, y = leg["indentation"] * per_metre, leg["force"] * per_newton
-                    ax.plot(x, y, color=each.colour, ls=BRANCH_DASHES[branch], **_LOOP)
+                    plot(ax, x.values, y.values, name, color=each.colour, ls=BRANCH_DASHES[branch], **_LOOP)
         ax.axhline(0, color=GREY, lw=0.5, zorder=0)
         if len(shown) > 1:
             ax.set_title(of_panel[0].name, loc="right")

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from icha.figures.drawn import Name, plot
 from icha.figures.indenter_curves import select_series
 from icha.figures.looks import legend_below
 from icha.figures.style import GREY, in_style, legend_handle, new_panels
@@ -34,7 +35,8 @@ def figure(campaign: xr.DataTree, *, study: str) -> Figure:
     series = select_series(campaign, study, only_jkr=True)
     drawn = []
     for each in series:
-        for run in each.runs.by_seed.values():
+        for seed, run in each.runs.by_seed.items():
+            labels = each.runs.labels._replace(seed=seed)
             for branch, choose in BRANCHES.items():
                 states = choose(steps_of(run))
                 chosen = [states[k] for k in spaced_states([state["indentation"] for state in states])]
@@ -42,16 +44,16 @@ def figure(campaign: xr.DataTree, *, study: str) -> Figure:
                 x, y = force / radius**1.5, radius**1.5 / float(run["shape_radius"])
                 # The line of JKR is zero here. States beyond it, of little contact area, would hide the others.
                 inside = x > -np.sqrt(8 * np.pi * float(run["contact_modulus"] * run["surface_energy"]))
-                drawn.append((branch, each, run, x[inside], y[inside]))
+                drawn.append((branch, each, labels, run, x[inside], y[inside]))
     scale, unit = choose_unit(max(float(np.abs(x).max(initial=0.0)) for *_, x, _ in drawn), "N")
     fig, [panels] = new_panels(3.0, sharex=True, sharey=True)
-    for branch, each, run, x, y in drawn:
+    for branch, each, labels, run, x, y in drawn:
         ax = panels[list(_TITLES).index(branch)]
-        ax.plot(x * scale, y * 1e3, marker=_TITLES[branch][1], mec=each.colour, **_STATES)
+        plot(ax, x * scale, y * 1e3, Name("states", labels), marker=_TITLES[branch][1], mec=each.colour, **_STATES)
         if (name := f"work_of_adhesion_{branch}") in run:
             modulus = float(run["contact_modulus"])
             line = 0.75 / modulus * (x + np.sqrt(8 * np.pi * modulus * float(run[name])))
-            ax.plot(x * scale, line * 1e3, color=each.colour, **_FIT)
+            plot(ax, x * scale, line * 1e3, Name("fit of JKR", labels), color=each.colour, **_FIT)
     for ax, (name, _) in zip(panels, _TITLES.values(), strict=True):
         ax.set_title(name, loc="right")
         ax.set(xlabel=rf"$F/a^{{3/2}}$  ({unit} m$^{{-3/2}}$)", ylabel=r"$a^{3/2}/R$  ($10^{-3}$ m$^{1/2}$)")

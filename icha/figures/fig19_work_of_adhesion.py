@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from icha.figures.drawn import Name, plot
 from icha.figures.indenter_curves import select_series
 from icha.figures.looks import distinct_colours, legend_below
 from icha.figures.select import NothingToDraw
@@ -50,10 +51,11 @@ def figure(campaign: xr.DataTree, *, study: str) -> Figure:
         for group in (each.runs for each in series if each.contact == contact):
             points = [(float(run["rms_height"]) * scale, value) for run, value in _values(group, quantity)]
             if points:
-                ax.plot(*np.transpose(points), marker=marker, mec=colour, **_ONE_SEED)
+                of_seeds = Name(f"{name}, single seeds", group.labels._replace(seed=None))
+                plot(ax, *np.transpose(points), of_seeds, marker=marker, mec=colour, **_ONE_SEED)
                 means.append(np.mean(points, axis=0))
         if means:
-            ax.plot(*np.transpose(means), marker=marker, color=colour, **_MEAN)
+            plot(ax, *np.transpose(means), f"{name}, mean", marker=marker, color=colour, **_MEAN)
             handles[name] = legend_handle(color=GREY if contact else colour, marker=marker, **_MEAN)
     ax.axhline(1, color=GREY, lw=0.6, zorder=0)
     ax.set(xlabel=f"rms height of the roughness ({unit})", ylabel=r"work of adhesion over $\Delta\gamma$")

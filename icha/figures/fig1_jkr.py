@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from icha.figures.drawn import plot
 from icha.figures.style import BLUE, GREY, VERMILLION, in_style, new_panels
 
 if TYPE_CHECKING:
@@ -32,11 +33,11 @@ def figure(*, tabor_parameter: float = 3.0) -> Figure:
     for ax, value in ((axes[0], lambda a: law.force(a, R)), (axes[1], lambda a: a)):
         ax.axhline(0, color="0.75", lw=0.6, zorder=0)
         ax.axvline(0, color="0.75", lw=0.6, zorder=0)
-        ax.plot(law.approach(unstable, R), value(unstable), ":", color=GREY, label="unstable")
+        plot(ax, law.approach(unstable, R), value(unstable), ls=":", color=GREY, label="unstable")
         loading = np.append([left, jump_in], law.approach(after_jump, R)), np.append([0, 0], value(after_jump))
-        ax.plot(*loading, "-", color=BLUE, lw=2.4, alpha=0.45, solid_joinstyle="round", label="loading")
+        plot(ax, *loading, ls="-", color=BLUE, lw=2.4, alpha=0.45, solid_joinstyle="round", label="loading")
         unloading = np.append(law.approach(stable[::-1], R), [jump_off, left]), np.append(value(stable[::-1]), [0, 0])
-        ax.plot(*unloading, "--", color=VERMILLION, dashes=(4, 2), label="unloading")
+        plot(ax, *unloading, ls="--", color=VERMILLION, dashes=(4, 2), label="unloading")
         _arrow(ax, jump_in, 0.0, value(a_in), BLUE)
         _arrow(ax, jump_off, value(a_off), 0.0, VERMILLION)
         for point, x, y, shift in (
@@ -44,7 +45,7 @@ def figure(*, tabor_parameter: float = 3.0) -> Figure:
             ("B", float(law.approach(a_pull, R)), value(a_pull), (3, -11) if ax is axes[0] else (5, -9)),
             ("C", jump_off, value(a_off), (-11, -9)),
         ):
-            ax.plot([x], [y], "o", color="white", mec="black", ms=4.5, zorder=5)
+            plot(ax, [x], [y], point, marker="o", color="white", mec="black", ms=4.5, zorder=5)
             ax.annotate(point, (x, y), shift, textcoords="offset points", fontweight="bold")
         ax.set(xlim=(left, right), xlabel=r"approach  $\delta\,/\,(\Delta\gamma^2 R/E^{\ast 2})^{1/3}$")
     axes[0].set(ylabel=r"force  $F/(\Delta\gamma\,R)$", ylim=(-6, 4.5))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.datasets.quantities import symbol_of
+from icha.figures.drawn import record
 from icha.figures.looks import legend_below
 from icha.figures.samples import responses, title_of
 from icha.figures.select import NothingToDraw
@@ -50,6 +51,7 @@ def figure(sensitivity: xr.DataTree, *, study: str, target: int = -1) -> Figure:
             values, widths = 100 * row[key].values, 100 * row[f"{key}_half_width"].values
             handles[words] = ax.barh(places + offset, values, _BAR, lw=0.8, **look)
             ends = np.clip([values - widths, values + widths], 0, 100)
+            record(ax, values, names, f"{title_of(data, row)}, {words}", low=ends[0], high=ends[1])
             ax.errorbar(values, places + offset, xerr=abs(ends - values), **_CAP)
         ax.set_title(title_of(data, row), loc="right", fontsize=8)
         ax.set(xlim=(0, 105), xlabel="share of variance (%)", yticks=places, yticklabels=[symbol_of(n) for n in names])

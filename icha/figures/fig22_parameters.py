@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.datasets import quantities
+from icha.figures.drawn import plot
 from icha.figures.looks import legend_below
 from icha.figures.samples import best_model, responses, scale_of, title_of
 from icha.figures.style import BLUE, TWO_COLUMNS, VERMILLION, in_style, legend_handle, logarithmic_axes, new_panels
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 _COLUMNS = 3
 # The axis of the result is logarithmic if the largest value is so many times the smallest.
 _DECADE = 5.0
+
+_CASE = {"ls": "none", "marker": "o", "ms": 3.2, "mfc": "none", "mec": BLUE, "mew": 0.7}
 
 
 @in_style
@@ -49,16 +52,17 @@ def figure(
             ax.remove()
             continue
         scale, label = scale_of(data, names[k])
-        ax.plot(data[names[k]].values * scale, results, "o", ms=3.2, mfc="none", mec=BLUE, mew=0.7)
+        plot(ax, data[names[k]].values * scale, results, "case", **_CASE)
         if int(row["degree"]):
-            ax.plot(data["effect_value"].values[k] * scale, row["main_effect"].values[k] * factor, color=VERMILLION)
+            mean = row["main_effect"].values[k] * factor
+            plot(ax, data["effect_value"].values[k] * scale, mean, "mean over the other parameters", color=VERMILLION)
         ax.set_xlabel(label)
         if k % columns == 0:
             ax.set_ylabel(described.label(unit))
     if np.nanmax(results) > _DECADE * np.nanmin(results):
         logarithmic_axes(panels[0, 0], "y")
     words = title_of(data, row)
-    handles = {f"one case: {words}": legend_handle(ls="none", marker="o", mfc="none", mec=BLUE, ms=3.2, mew=0.7)}
+    handles = {f"one case: {words}": legend_handle(**_CASE)}
     if int(row["degree"]):
         handles["mean over the other parameters"] = legend_handle(color=VERMILLION)
     legend_below(fig, handles)

@@ -8,6 +8,7 @@ import numpy as np
 
 from icha.datasets.quantities import label_of, quantity
 from icha.figures import curves
+from icha.figures.drawn import Name, plot, record
 from icha.figures.ensembles import draw_members
 from icha.figures.style import BLACK, GREY, in_style, logarithmic_axes, new_panels
 
@@ -72,7 +73,9 @@ def figure(
             load, members = _difference(line, truth, points)
             if members.size:
                 look, asked = line.look | {"lw": 0.6}, min(line.runs.asked, truth.runs.asked)
-                draw_members(ax, load, members, look, positive=False, asked=asked, curves=len(compared))
+                name = line.runs.drawn_name._replace(curve="asperities relative to boundary elements")
+                of_curve = {"name": name, "asked": asked, "curves": len(compared)}
+                draw_members(ax, load, members, look, positive=False, **of_curve)
         logarithmic_axes(ax, "x")
         ax.axhline(0, color="0.6", lw=0.6, zorder=0)
         ax.set_ylabel(rf"${quantity(error).symbol}$  (%)")
@@ -105,10 +108,10 @@ def _in_physical_units(campaign, study, references):
         p = references["reduced_pressure"].values * modulus * pressure.factor
         inside = (p >= limits[0]) & (p <= limits[1])
         look = {"color": BLACK, "lw": 1, "zorder": 2}
-        left.plot(p[inside], references["persson_area_fraction"].values[inside], label="Persson", **look)
+        plot(left, p[inside], references["persson_area_fraction"].values[inside], label="Persson", **look)
         if "persson_reduced_separation" in references:
             separation = references["persson_reduced_separation"].values[inside] * height * gap.factor
-            right.plot(p[inside], separation, label="Yang & Persson", **look | {"ls": (0, (7, 2))})
+            plot(right, p[inside], separation, label="Yang & Persson", **look | {"ls": (0, (7, 2))})
     for ax in (left, right):
         ax.set_xlabel(pressure.label)
     left.set_ylabel(label_of("contact_area_fraction"))
@@ -152,23 +155,29 @@ def _draw_references(left, right, references, limits):
     """Draw published results and theories of rough contact; `limits` are the smallest and the largest load."""
     p, black = references["reduced_pressure"].values, {"color": BLACK, "lw": 1, "zorder": 2}
     shown = (p >= limits[0] / 1.5) & (p <= limits[1] * 1.5)
-    left.plot(p[shown], references["persson_area_fraction"].values[shown] / p[shown], label="Persson", **black)
+    plot(left, p[shown], references["persson_area_fraction"].values[shown] / p[shown], label="Persson", **black)
     corrected = references["xu_area_fraction"].values[shown]
-    left.plot(p[shown], corrected / p[shown], label="Persson, corrected by Xu et al.", **black | {"ls": (0, (1, 1))})
+    plot(left, p[shown], corrected / p[shown], label="Persson, corrected by Xu et al.", **black | {"ls": (0, (1, 1))})
     linear = references["linear_pressure"].values
     touching = linear >= limits[0] / 1.5
     area = references["bush_gibson_thomas_area_fraction"].values[touching]
-    left.plot(
-        linear[touching], area / linear[touching], label="Bush, Gibson & Thomas", **black | {"ls": "--", "color": GREY}
+    plot(
+        left,
+        linear[touching],
+        area / linear[touching],
+        label="Bush, Gibson & Thomas",
+        **black | {"ls": "--", "color": GREY},
     )
     if "gfmd_reduced_pressure" in references:
         load, area, scatter = (
             references[f"gfmd_{n}"].values for n in ("reduced_pressure", "area_fraction", "area_scatter")
         )
         points = {"fmt": "x", "color": BLACK, "ms": 6, "mew": 1.2, "lw": 1.2, "zorder": 5}
+        record(left, load, area / load, "GFMD", low=(area - scatter) / load, high=(area + scatter) / load)
         left.errorbar(load, area / load, scatter / load, label="GFMD, no adhesion", **points)
     if "persson_reduced_separation" in references:
-        right.plot(
+        plot(
+            right,
             p[shown],
             references["persson_reduced_separation"].values[shown],
             label="Yang & Persson",
@@ -198,7 +207,8 @@ def _draw_estimates(axes, shown, compared):
             inside = (states[0] >= load.min()) & (states[0] <= load.max())
             at = states[0][inside]
             known = common_loads.interpolate(load, true, at, logarithmic=points is curves.area_points)
-            ax.plot(at, 100 * (values[inside] / known - 1), color=colour, **_ESTIMATE)
+            name = Name("Ciavarella, from runs without adhesion", truth.runs.labels._replace(seed=seed))
+            plot(ax, at, 100 * (values[inside] / known - 1), name, color=colour, **_ESTIMATE)
             named = colour if single else GREY
             ax.plot([], [], color=named, label="Ciavarella, from runs without adhesion", **_ESTIMATE)
 
@@ -235,5 +245,5 @@ def _draw_separate_summits(left, right, references, dataset, looks):
         look, pressed = {"ls": dashes, "lw": 0.8, "zorder": 1.8}, p > 0
         area = theory["summit_area_fraction"].values[pressed] / p[pressed]
         for ax, values in ((left, area), (right, separation[pressed])):
-            ax.plot(p[pressed], values, color=colour, **look)
+            plot(ax, p[pressed], values, label, color=colour, **look)
             ax.plot([], [], color=colour if len(theories) <= 2 else GREY, label=label, **look)

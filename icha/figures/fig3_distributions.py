@@ -9,6 +9,7 @@ import numpy as np
 
 from icha.contact.attraction import FINITE_RANGE
 from icha.figures.curves import add_snapshot_legend, drop_rounding_errors, snapshot_looks
+from icha.figures.drawn import plot
 from icha.figures.ensembles import draw_members, join_bins
 from icha.figures.looks import MODEL_MARKERS, REFERENCE_NAME, TRUTH_LINE
 from icha.figures.select import has_shape, select_snapshots
@@ -39,7 +40,7 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
     tails = []
     for line, look in zip(lines, each_look, strict=True):
         u, densities = gap_densities(line.members)
-        drawn = {"positive": True, "asked": line.runs.asked}
+        drawn = {"positive": True, "name": line.runs.drawn_name, "asked": line.runs.asked}
         draw_members(left, u, densities, look, **drawn)
         floor = drop_rounding_errors(densities.mean(axis=0)).min(initial=floor)
         p, densities = pressure_densities(line.members)
@@ -53,7 +54,8 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
         beside = ((left, *gap_densities(line.truths)), (right, *pressure_densities(line.truths, joined=True)))
         for ax, at, densities in beside:
             dashed = TRUTH_LINE | {"color": look["color"], "marker": MODEL_MARKERS[REFERENCE_NAME]}
-            ax.plot(at, densities.mean(axis=0), markevery=1 + len(at) // _BESIDE_MARKERS, **dashed)
+            every = 1 + len(at) // _BESIDE_MARKERS
+            plot(ax, at, densities.mean(axis=0), line.truth_name, markevery=every, **dashed)
             top = densities.mean(axis=0).max(initial=top) if ax is right else top
         tails.append((line.truths, look["color"]))
     logarithmic_axes(left)
@@ -61,7 +63,7 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
     left.set_ylim(floor / 2)
     for truths, colour in tails:
         p, density = singular_tail(truths, 1.05 * lowest)
-        right.semilogy(p, density, ls=":", lw=1.1, color=colour, zorder=3)
+        plot(right, p, density, "singular tension at the edge", ls=":", lw=1.1, color=colour, zorder=3)
         if p.size:
             right.plot([], [], ls=":", lw=1.1, color=GREY, label="singular tension at the edge")
     load = np.mean([float(state_of(run, at)["reduced_pressure"]) for run, at in lines[-1].members])
@@ -76,7 +78,7 @@ def _finish(left, right, pressures, highest, load):
 
     if load > 0:
         p = np.linspace(0.002, pressures[1], 300)
-        right.semilogy(p, persson_pressure_density(p, load), "-", color=BLACK, lw=0.9, label="Persson", zorder=2)
+        plot(right, p, persson_pressure_density(p, load), color=BLACK, lw=0.9, label="Persson", zorder=2)
     right.set_xlim(1.05 * np.array(pressures))
     if highest > 0:
         right.set_ylim(highest * 5e-5, highest * 3)

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.datasets.labels import RunLabels
+from icha.figures.drawn import Name
 from icha.figures.looks import NOT_APPLICABLE_ALONE, REFERENCE_NAME, run_label
-from icha.figures.maps import draw_map, draw_spots, topography_of, wrap_circles
+from icha.figures.maps import draw_map, draw_spots, record_spots, topography_of, wrap_circles
 from icha.figures.select import is_applicable, select_complete_run
 from icha.figures.style import BLUE, format_number, in_style, legend_handle, new_panels
 
@@ -70,9 +71,11 @@ def figure(
     heights = {"cmap": "cividis", "vmin": -topography.highest, "vmax": topography.highest}
     image = topography.draw(whole, **heights)
     draw_spots(whole, circles, facecolor=(*_RED, 0.85), lw=0, rasterized=len(circles) > _MANY_SPOTS)
+    record_spots(whole, circles, topography.side, Name("spots", labels))
     nodes, borders = _window(topography.heights, topography.side, corner, width)
     enlarged.imshow(nodes * topography.scale, extent=borders, origin="lower", interpolation="nearest", **heights)
-    draw_spots(enlarged, circles, facecolor=(*_RED, 0.4) if beside is None else "none", edgecolor=_RED, lw=1.0)
+    colour = (*_RED, 0.4) if beside is None else "none"
+    draw_spots(enlarged, circles, facecolor=colour, edgecolor=_RED, lw=1.0)
     area = rf"$A/A_0$ = {float(state['contact_area_fraction']):.3f}"
     whole.set_title(area if beside is None else f"asperities, {area}", loc="right")
     enlarged.set_title(f"enlarged ×{topography.side / width:.0f}", loc="right")

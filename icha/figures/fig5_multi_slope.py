@@ -16,6 +16,7 @@ from icha.figures.curves import (
     ratio_points,
     study_curves,
 )
+from icha.figures.drawn import plot
 from icha.figures.looks import ASPERITIES_NAME, MODEL_MARKERS, REFERENCE_NAME, TRUTH_LINE, model_handle, surface_label
 from icha.figures.select import has_shape
 from icha.figures.style import DASHES, in_style, new_panels
@@ -122,7 +123,7 @@ def _draw_measured(ax, points, load, area, known, look):
         return np.empty(0)
     load = load / unit
     values = area if points is _area_at_load else area / load
-    ax.plot(load, values, **look | {"lw": 1.1, "zorder": 1, "label": known["label"]})
+    plot(ax, load, values, **look | {"lw": 1.1, "zorder": 1, "label": known["label"]})
     return values
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from icha.figures.drawn import Name
 from icha.figures.looks import NOT_APPLICABLE_ALONE, graded_colours, legend_below
-from icha.figures.maps import draw_spots, wrap_circles
+from icha.figures.maps import draw_spots, record_spots, wrap_circles
 from icha.figures.select import is_applicable, select_by_labels, select_runs, snapshot_label
 from icha.figures.style import in_style, new_panels, slope_label
 from icha.support.formatting import choose_unit
@@ -32,6 +33,7 @@ def figure(
 
     runs = select_by_labels(select_runs(campaign, study), surface=surface, seed=seed, material=material)
     by_slope = {labels.rms_slope: run for labels, run in runs}
+    names = {labels.rms_slope: Name("spots", labels) for labels, _ in runs}
     slopes = sorted(by_slope, reverse=True)
     # Slopes have colours from dark to bright, because the other colours stand for materials.
     colours = dict(zip(slopes, graded_colours(len(slopes)), strict=True))
@@ -39,20 +41,20 @@ def figure(
     fig, [panels] = new_panels(3.8, sharey=True)
     length, unit = choose_unit(float(by_slope[slopes[0]]["period"]), "m")
     for ax, kind in zip(panels, _KINDS, strict=True):
-        _draw_slopes(ax, by_slope, kind, colours, length)
+        _draw_slopes(ax, by_slope, names, kind, colours, length)
         ax.set_aspect("equal")
         ax.set_xlabel(f"$x$ ({unit})")
     panels[0].set_ylabel(f"$y$ ({unit})")
-    names = {
+    words = {
         slope: slope_label(slope) + ("" if is_applicable(run) else f" ({NOT_APPLICABLE_ALONE})")
         for slope, run in by_slope.items()
     }
-    legend_below(fig, {names[slope]: Patch(facecolor=colours[slope]) for slope in slopes})
+    legend_below(fig, {words[slope]: Patch(facecolor=colours[slope]) for slope in slopes})
     return fig
 
 
-def _draw_slopes(ax, runs, kind, colours, length):
-    """Draw the spots of each slope at the first snapshot of a kind; `runs` maps slopes to runs."""
+def _draw_slopes(ax, runs, names, kind, colours, length):
+    """Draw the spots of each slope at the first snapshot of a kind; `runs` and `names` are by slope."""
     from matplotlib.collections import PatchCollection
     from matplotlib.patches import Wedge
 
@@ -67,6 +69,7 @@ def _draw_slopes(ax, runs, kind, colours, length):
         side, spots = float(run["period"]) * length, spots_of(run, at[slope])
         places = (spots[f"spot_{name}"].values * length for name in ("x", "y", "radius"))
         circles = wrap_circles(*places, side, str(run["boundary"].values))
+        record_spots(ax, circles, side, names[slope])
         if kind == "relative_load":
             draw_spots(ax, circles, zorder=2 + order, **look)
         else:

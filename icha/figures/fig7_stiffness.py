@@ -8,6 +8,7 @@ import numpy as np
 
 from icha.datasets.quantities import label_of
 from icha.figures.curves import add_legend, draw_curves, drop_rounding_errors, study_curves
+from icha.figures.drawn import plot
 from icha.figures.select import NothingToDraw
 from icha.figures.style import BLACK, in_style, new_panels
 
@@ -32,8 +33,8 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
         theory = references["persson_reduced_stiffness"].values
         shown = (p >= x[0] / 1.5) & (p <= x[1] * 1.5)
         look = {"ls": "-", "color": BLACK, "lw": 1, "label": "Yang & Persson", "zorder": 2}
-        left.plot(p[shown], theory[shown], **look)
-        right.plot(p[shown], theory[shown] / p[shown], **look)
+        plot(left, p[shown], theory[shown], **look)
+        plot(right, p[shown], theory[shown] / p[shown], **look)
         ratio = np.concatenate([ratio, theory[shown] / p[shown]])
     y = (drop_rounding_errors(stiffnesses).min() / 2, stiffnesses.max() * 2)
     label = label_of("reduced_pressure")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.figures.curves import add_snapshot_legend, snapshot_looks
+from icha.figures.drawn import plot
 from icha.figures.ensembles import draw_members, join_bins
 from icha.figures.looks import MODEL_MARKERS, REFERENCE_NAME, TRUTH_LINE
 from icha.figures.select import select_snapshots
@@ -48,10 +49,11 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
         smooth = look | {"marker": "none", "lw": 1.4 * look["lw"]}
         drawn = [(patch_density, look, MODEL_MARKERS[REFERENCE_NAME]), (patches_above, smooth, "none")]
         for ax, (points, line_look, marker) in zip(panels, drawn[-len(panels) :], strict=True):
-            draw_members(ax, *points(own, cell), line_look, positive=True, asked=line.runs.asked)
+            name = line.runs.drawn_name
+            draw_members(ax, *points(own, cell), line_look, positive=True, name=name, asked=line.runs.asked)
             if true:
                 area, values = points(true, cell)
-                ax.plot(area, values.mean(axis=0), color=look["color"], marker=marker, **TRUTH_LINE)
+                plot(ax, area, values.mean(axis=0), line.truth_name, color=look["color"], marker=marker, **TRUTH_LINE)
     for ax in panels:
         logarithmic_axes(ax)
         ax.set_xlabel(f"patch area  $A$ ({unit}²)")

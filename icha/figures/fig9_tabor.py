@@ -9,6 +9,7 @@ import numpy as np
 from icha.contact.attraction import FINITE_RANGE, SHORT_RANGE
 from icha.datasets.quantities import label_of
 from icha.figures.curves import gap_label
+from icha.figures.drawn import plot, record
 from icha.figures.ensembles import Points, points_handles
 from icha.figures.looks import Looks, legend_below, named_handles
 from icha.figures.select import ContactRuns, NothingToDraw, group_by_contact, select_runs, snapshot_label
@@ -71,6 +72,7 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
         look = {"color": looks.colour(contact) if looks.by_place else GREY, "label": None if k else "no adhesion"}
         for ax, name in zip(panels, _STATE, strict=True):
             mean = np.mean([float(state[name]) for group in line for state in group.by_seed.values()])
+            record(ax, [min(drawn), max(drawn)], [mean, mean], line[0].drawn_name)
             ax.axhline(mean, ls=(0, (5, 2)), lw=1, zorder=1, **look)
     for ax, label in zip(panels, (label_of("contact_area_fraction"), gap_label(dataset)), strict=True):
         if max(drawn) > _SPAN * min(drawn):
@@ -94,11 +96,11 @@ def _pull_off_of_spheres(runs):
         ax.plot(tabor, values, color=GREY, lw=0.6, zorder=1)
         for chosen, fill, label in ((resolved, "C0", FINITE_RANGE), (~resolved, "white", SHORT_RANGE)):
             if chosen.any():
-                ax.plot(tabor[chosen], values[chosen], "o", ms=4.5, mec="C0", mfc=fill, label=label)
+                plot(ax, tabor[chosen], values[chosen], ls="none", marker="o", ms=4.5, mec="C0", mfc=fill, label=label)
         logarithmic_axes(ax, "x")
         ax.set_xlabel(label_of("tabor_parameter"))
     at = np.geomspace(tabor.min(), tabor.max(), 200)
-    panels[0].plot(at, [sphere_pull_off_factor(each) for each in at], color="0.3", lw=1, label="theory of Maugis")
+    plot(panels[0], at, [sphere_pull_off_factor(each) for each in at], color="0.3", lw=1, label="theory of Maugis")
     for limit, name, style in ((1.5, "JKR", (0, (5, 2))), (2.0, "DMT", ":")):
         panels[0].axhline(limit, color="0.3", lw=0.9, ls=style, label=name)
     panels[0].set(ylabel=r"pull-off force$\,/\,\pi\Delta\gamma R$", ylim=(1.4, 2.1))

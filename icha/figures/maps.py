@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from icha.figures.drawn import Name, record
 from icha.support.formatting import choose_unit
 
 if TYPE_CHECKING:
@@ -95,6 +96,12 @@ def wrap_circles(x, y, radius, period: float, boundary: str) -> np.ndarray:
     circles = np.concatenate([centres, np.broadcast_to(np.asarray(radius)[:, None, None], (*centres.shape[:2], 1))], -1)
     reach = circles[..., 2:]
     return circles[np.all((circles[..., :2] > -reach) & (circles[..., :2] < period + reach), axis=-1)]
+
+
+def record_spots(axes: Axes, circles: np.ndarray, side: float, name: Name) -> None:
+    """Record contact spots on a square; periodic images of spots are left out."""
+    x, y, radius = circles[((circles[:, :2] >= 0) & (circles[:, :2] < side)).all(axis=1)].T
+    record(axes, x, y, name, radius=radius)
 
 
 def draw_spots(axes: Axes, circles: np.ndarray, **look) -> None:

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from icha.figures.drawn import record
 from icha.figures.style import in_style
 
 if TYPE_CHECKING:
@@ -48,4 +49,7 @@ def figure(campaign: xr.DataTree, script: str, *, study: str) -> Figure:
         raise ValueError(f"{script}, line {lines[-1] if lines else 1}: {type(error).__name__}: {error}") from None
     if not isinstance(drawn, Figure):
         raise ValueError(f"{script}: draw returned {type(drawn).__name__}; expected a figure of matplotlib")
+    for axes in drawn.axes:
+        for line in axes.get_lines():
+            record(axes, *line.get_data(), line.get_label())
     return drawn

@@ -15,7 +15,9 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from icha.datasets.results import figure_number
+from icha.datasets.table import as_csv
 from icha.figures.captions import caption_of, count_runs, sentence_on_loops, sentence_on_measurements, texts_of
+from icha.figures.drawn import table_of
 from icha.figures.style import GREY, in_style, new_figure, save
 from icha.support.atomic_files import whole_file
 from icha.support.scripts import caption_in
@@ -39,12 +41,13 @@ def draw_figure(
     png: str | os.PathLike,
     pdf: str | os.PathLike,
     text: str | os.PathLike,
+    table: str | os.PathLike,
     *,
     inputs: Mapping[str, str | Sequence[str]],
     arguments: Mapping[str, Any],
     studies: Sequence[str] = (),
 ) -> None:
-    """Draw a figure and write it to `png` and `pdf`, and its caption to the file `text`.
+    """Draw a figure and write it to `png` and `pdf`, its caption to the file `text`, and what it draws to `table`.
 
     If no run in the figure is complete, the figure is a message only.
 
@@ -71,6 +74,8 @@ def draw_figure(
         print(caption)
         figure = _empty_page(str(reason))
     save(figure, png, pdf)
+    with whole_file(table) as temporary:
+        temporary.write_text(as_csv(table_of(figure)), encoding="utf-8")
     with whole_file(text) as temporary:
         temporary.write_text(f"{caption} {count_runs(data, studies, shown)}".strip() + "\n", encoding="utf-8")
 

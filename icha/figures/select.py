@@ -12,6 +12,7 @@ from icha.contact.attraction import FINITE_RANGE
 from icha.contact.models import MODELS, REFERENCE_MODEL, first_model, model_of
 from icha.datasets.labels import LABELS, RunLabels, place_of, surfaces_and_slopes
 from icha.datasets.quantities import quantity
+from icha.figures.drawn import Name
 from icha.figures.style import format_number
 from icha.path.targets import UNITS, UNLOADING
 from icha.support.formatting import format_quantity
@@ -60,6 +61,17 @@ class ContactRuns(NamedTuple):
     def model_name(self) -> str:
         """Name of the model in legends."""
         return name_of_model(next(iter(self.by_seed.values())))
+
+    @property
+    def drawn_name(self) -> Name:
+        """Name in the table of a figure: the model, and the labels; without the seed if there are several seeds."""
+        several = len(self.by_seed) > 1
+        return Name(self.model_name, self.labels._replace(seed=None) if several else self.labels)
+
+    @property
+    def names_of_seeds(self) -> dict[int, Name]:
+        """Names of the single runs in the table of a figure, by seed."""
+        return {seed: Name(self.model_name, self.labels._replace(seed=seed)) for seed in self.by_seed}
 
     @property
     def surface_energy(self) -> float:
@@ -232,6 +244,12 @@ class Snapshots(NamedTuple):
     runs: ContactRuns
     members: list[tuple[xr.Dataset, int]]
     truths: list[tuple[xr.Dataset, int]]
+
+    @property
+    def truth_name(self) -> Name:
+        """Name of the runs with boundary elements in the table of a figure."""
+        labels = self.runs.labels._replace(model=REFERENCE_MODEL, seed=None)
+        return Name(MODELS[REFERENCE_MODEL].words, labels)
 
 
 def select_snapshots(

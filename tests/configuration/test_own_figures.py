@@ -9,6 +9,7 @@ import small_campaign as small
 from icha.configuration.figures import OwnFigure
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import write_dataset
+from icha.datasets.results import FIGURE_ENDINGS
 from icha.figures.registry import draw_figure
 from icha.support.scripts import modules_of
 
@@ -30,7 +31,7 @@ def draw(study):
 def draw(tmp_path):
     """A function that draws the study `single` of the small campaign with a script."""
     write_dataset(campaign_tree(small.runs(), attrs={"title": "Small", "summary": "Small."}), tmp_path / "small.nc")
-    files = [tmp_path / f"mine.{ending}" for ending in ("png", "pdf", "txt")]
+    files = [tmp_path / f"mine.{ending}" for ending in FIGURE_ENDINGS]
 
     def drawn(text):
         script = tmp_path / "mine.py"
@@ -43,7 +44,8 @@ def draw(tmp_path):
 
 
 def test_a_script_draws_a_figure_with_its_docstring_as_caption(draw, tmp_path):
-    png, pdf, caption = draw(AREAS)
+    png, pdf, caption, table = draw(AREAS)
+    assert len(table.read_text().splitlines()) > 2
     assert caption.read_text() == "Contact area against load.\n"
     first = png.read_bytes(), pdf.read_bytes()
     draw(AREAS)

@@ -18,6 +18,7 @@ from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import read_dataset, write_dataset
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of
+from icha.datasets.results import FIGURE_ENDINGS
 from icha.datasets.surface_file import write_surface
 from icha.figures import (
     ensembles,
@@ -228,7 +229,7 @@ def test_the_caption_names_the_measurements_of_fig5(tmp_path):
     known = {"columns": {"p": 1.0, "a": 1.0}, "contact_modulus": None, "material": None, "rms_slope": None}
     measurements = [known | {"label": "rubber", "citation": "A. Author (2000)"}]
     inputs = {"campaign": str(tmp_path / "small.nc"), "tables": [str(tmp_path / "one.csv")]}
-    files = [tmp_path / f"five.{ending}" for ending in ("png", "pdf", "txt")]
+    files = [tmp_path / f"five.{ending}" for ending in FIGURE_ENDINGS]
     arguments = {"study": "slopes", "measurements": measurements}
     draw_figure("fig5_multi_slope", *files, inputs=inputs, arguments=arguments, studies=["slopes"])
     assert "Lines without markers are measurements: rubber (A. Author (2000))." in files[2].read_text()

@@ -17,6 +17,7 @@ from icha.figures import (
     fig15_loss,
 )
 from icha.figures.captions import count_runs
+from icha.figures.drawn import Name
 from icha.figures.ensembles import draw_members, draw_points
 from icha.figures.looks import FEWER_SEEDS, NOT_APPLICABLE, NOT_APPLICABLE_ALONE
 from icha.figures.style import new_figure
@@ -90,7 +91,7 @@ def test_no_line_joins_means_over_different_seeds(few):
     members[1, 2:], members[3, 1:] = np.nan, np.nan
     axes = new_figure(3, 3).subplots()
     look = {"color": "#0072B2", "mec": "#0072B2", "mfc": "#0072B2", "marker": "o", "ms": 4, "ls": "-"}
-    few(axes, np.arange(4.0), members, look, positive=False, asked=5)
+    few(axes, np.arange(4.0), members, look, positive=False, name=Name("mean"), asked=5)
     (mean,) = [line for line in axes.get_lines() if line.get_linestyle() == "-" and line.get_marker() == "o"]
     assert segments(mean) == [(2.0, 3.0)]
     (cross,) = crossed(axes)

@@ -13,6 +13,7 @@ from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import read_campaign, read_dataset, read_run, write_dataset
 from icha.datasets.format import RUN, problems_with_file
 from icha.datasets.labels import RunLabels
+from icha.datasets.results import FIGURE_ENDINGS
 from icha.datasets.surface_file import write_surface
 from icha.figures.fig2_area_and_gap import figure
 from icha.figures.registry import draw_figure
@@ -139,7 +140,7 @@ def test_a_campaign_of_runs_without_stops_has_a_dataset_and_an_empty_figure(swee
     assert tree["sticky"]["status"].values.ravel().tolist() == [5, 5]
     with pytest.raises(NothingToDraw):
         figure(tree, study="sticky")
-    files = [tmp_path / f"fig2.{ending}" for ending in ("png", "pdf", "txt")]
+    files = [tmp_path / f"fig2.{ending}" for ending in FIGURE_ENDINGS]
     draw_figure("fig2_area_and_gap", *files, inputs={"campaign": str(file)}, arguments={"study": "sticky"})
     assert all(file.stat().st_size > 50 for file in files) and "Nothing to draw: " in files[2].read_text()
 

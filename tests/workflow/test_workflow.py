@@ -18,6 +18,7 @@ from traces import traces
 from icha.configuration.cases import campaign_sha256
 from icha.configuration.figures import Figures
 from icha.configuration.load import load_configuration
+from icha.datasets.results import FIGURE_ENDINGS
 from icha.support.checksums import changed_files
 
 # A campaign that confirms an unusual value.
@@ -49,7 +50,7 @@ def test_all_promised_files_exist(smoke):
     files = results_of(smoke)
     promised = {
         *PROMISED.split(),
-        *(f"figures/{figure}.{ending}" for figure in FIGURES for ending in ("png", "pdf", "txt")),
+        *(f"figures/{figure}.{ending}" for figure in FIGURES for ending in FIGURE_ENDINGS),
     }
     assert promised <= files.keys()
     results = smoke / "results/smoke"

@@ -1,5 +1,6 @@
-# figures/<name>.png, .pdf and .txt, the caption. A figure depends on the data, on its options and on its code. Its request
-# names the inputs and the arguments (icha/configuration/figures.py). One job draws a batch of figures.
+# figures/<name>.png, .pdf, .txt (the caption) and .csv (what is drawn). A figure depends on the data, on its options and
+# on its code. Its request names the inputs and the arguments (icha/configuration/figures.py). One job draws a batch of
+# figures.
 
 from icha.configuration.figures import drawing
 from icha.datasets.results import FIGURE, FIGURE_ENDINGS, ResultFiles
@@ -23,7 +24,9 @@ def figure_files(name):
 
 def input_files(name):
     """Return the input files of a figure."""
-    return [file for given in DRAWINGS[name]["inputs"].values() for file in ([given] if isinstance(given, str) else given)]
+    return [
+        file for given in DRAWINGS[name]["inputs"].values() for file in ([given] if isinstance(given, str) else given)
+    ]
 
 
 def given_files(name):
@@ -34,6 +37,7 @@ def given_files(name):
 
 
 for number, names in enumerate(figure_batches(FIGURES)):
+
     rule:
         name:
             f"draw_figures_{number}"

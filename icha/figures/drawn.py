@@ -1,0 +1,81 @@
+"""Record what a figure draws, for the table `figures/NAME.csv` beside its picture.
+
+Functions that draw data also record it. The table has a row for each point, with these columns; columns without any
+value are left out:
+
+panel : letter of the panel.
+curve : what the point belongs to: a model, a theory, a kind of event.
+model, surface, seed, rms_slope, material : labels of the run; empty if the curve shows several runs.
+x, y : values in the units of the axes.
+low, high : ends of the error bar or band: of the 95 % interval for five or more seeds, otherwise of the range.
+seeds : number of seeds in the mean.
+radius : radius of a contact spot at x and y.
+x_quantity, y_quantity : labels of the axes, with their units.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from icha.datasets.labels import LABELS, RunLabels
+from icha.datasets.quantities import plain
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+_COLUMNS = ("panel", "curve", *LABELS, "x", "y", "low", "high", "seeds", "radius", "x_quantity", "y_quantity")
+
+
+class Name(NamedTuple):
+    """Name of a curve in the table: its name in words, and the labels that all its runs have in common."""
+
+    curve: str
+    labels: RunLabels | None = None
+
+
+def plot(axes: Axes, x: Any, y: Any, name: Name | str = "", **look: Any) -> Line2D:
+    """Draw a line and record its points; `look` are arguments of `Axes.plot`. The label is the default of the name."""
+    record(axes, x, y, name or look.get("label") or "")
+    (line,) = axes.plot(x, y, **look)
+    return line
+
+
+def record(axes: Axes, x: Any, y: Any, name: Name | str, **columns: Any) -> None:
+    """Record points of a panel; `columns` are further columns of the table, with a value for each or for all points."""
+    name = Name(name) if isinstance(name, str) else name
+    labels = {} if name.labels is None else {label: getattr(name.labels, label) for label in LABELS}
+    figure = axes.get_figure()
+    figure.__dict__.setdefault("recorded", []).append((axes, {"curve": name.curve, "x": x, "y": y} | labels | columns))
+
+
+def table_of(figure: Figure) -> pd.DataFrame:
+    """Return the recorded points of a figure; points that are not finite are left out."""
+    import pandas as pd
+
+    frames = []
+    for axes, columns in getattr(figure, "recorded", []):
+        frame = pd.DataFrame(columns, index=range(len(columns["x"])))
+        finite = np.all([frame[key].map(lambda value: value == value) for key in "xy"], axis=0)
+        texts = {"panel": axes.get_title("left").strip("()")}
+        texts |= {f"{direction}_quantity": plain(_label(axes, direction)) for direction in "xy"}
+        frames.append(frame[finite].assign(**texts))
+    table = pd.concat([pd.DataFrame(columns=_COLUMNS[:1]), *(each for each in frames if len(each))])
+    shown = [column for column in _COLUMNS if column in table and not table[column].isin([None, "", np.nan]).all()]
+    return table[shown or list(_COLUMNS)] if frames else pd.DataFrame(columns=_COLUMNS)
+
+
+def _label(axes, direction):
+    """Return the label of an axis, or of the same axis in another panel of the column (x) or of the row (y)."""
+    figure, span = axes.get_figure(), {"x": "colspan", "y": "rowspan"}[direction]
+
+    def place(panel):
+        return getattr(panel.get_subplotspec(), span, None)
+
+    alike = [axes, *(panel for panel in figure.axes if place(panel) == place(axes))]
+    labels = (getattr(panel, f"get_{direction}label")() for panel in alike)
+    return " ".join(next(filter(None, labels), "").replace("$", "").split())

@@ -1,0 +1,77 @@
+"""The table beside each figure has the numbers of the runs, with their labels."""
+
+import io
+
+import compared_campaign as compared
+import numpy as np
+import pandas as pd
+import small_campaign as small
+from xarray import DataTree
+
+from icha.datasets.campaign import find_snapshot
+from icha.datasets.files import write_dataset
+from icha.datasets.table import as_csv
+from icha.figures import fig2_area_and_gap, fig6_spots_by_slope, fig8_patch_sizes, fig10_model_error
+from icha.figures.drawn import table_of
+from icha.figures.registry import draw_figure
+from icha.figures.select import path_steps
+
+
+def table(figure):
+    return pd.read_csv(io.StringIO(as_csv(table_of(figure))))
+
+
+def test_means_over_seeds_with_their_range():
+    data = table(fig2_area_and_gap.figure(small.tree(), study="single"))
+    ratios = data[data.panel == "a"]
+    assert set(ratios.curve) == {"asperities"} and set(ratios.material) == {"soft"} and "seed" not in data
+    stops = [path_steps(small.run(seed)) for seed in (1, 2)]
+    each = [run["contact_area_fraction"].values / run["reduced_pressure"].values for run in stops]
+    np.testing.assert_allclose(ratios.x, small.PRESSURES, rtol=1e-6)
+    np.testing.assert_allclose(ratios.y, np.mean(each, axis=0), rtol=1e-4)
+    np.testing.assert_allclose([ratios.low, ratios.high], [np.min(each, axis=0), np.max(each, axis=0)], rtol=1e-4)
+    assert set(ratios.seeds) == {2} and set(ratios.x_quantity) == {"reduced pressure F/(E*h'rmsA0)"}
+    assert set(data[data.panel == "b"].y_quantity) == {"mean separation ū/h_rms"}
+
+
+def test_single_runs_have_their_seed_and_slope():
+    data = table(fig2_area_and_gap.figure(small.tree(), study="slopes"))
+    run = path_steps(small.run(rms_slope=0.2, material="hertz"))
+    shown = data[(data.panel == "b") & (data.rms_slope == 0.2) & (data.material == "hertz")]
+    np.testing.assert_allclose(shown.y, run["reduced_separation"].values, rtol=1e-9)
+    assert set(shown.seed) == {1} and set(shown.model) == {"asperities"}
+
+
+def test_points_that_are_drawn_apart_have_their_load():
+    error = compared.errors()
+    data = table(fig10_model_error.figure(compared.tree(), error, study="one"))
+    loads = error["one"]["reduced_pressure"].values
+    assert np.isclose(data.x.values[:, None], loads, rtol=1e-12).any(axis=1).all()
+    areas = data[data.panel == "a"]
+    means = 100 * error["one"]["area_error"].mean("seed").values.ravel()
+    assert np.isclose(areas.y.values[:, None], means, rtol=1e-8).any(axis=1).all()
+
+
+def test_boundary_elements_are_named_as_such():
+    data = table(fig8_patch_sizes.figure(compared.tree_of_both(), study="one"))
+    assert set(zip(data.curve, data.model, strict=True)) == {
+        ("asperities", "asperities"),
+        ("boundary elements", "boundary_elements"),
+    }
+
+
+def test_spots_are_listed_once():
+    run = small.run(rms_slope=0.2)
+    count = int((run["spot_snapshot"] == find_snapshot(run, "relative_load")).sum())
+    data = table(fig6_spots_by_slope.figure(small.tree(), study="slopes", material="soft"))
+    shown = data[(data.panel == "a") & (data.rms_slope == 0.2)]
+    assert len(shown) == count and shown.radius.gt(0).all() and shown.x_quantity.str.fullmatch("x .µm.").all()
+
+
+def test_a_figure_without_data_has_an_empty_table(tmp_path):
+    files = [tmp_path / name for name in ("a.png", "a.pdf", "a.txt", "a.csv")]
+    study = small.tree()["slopes"].to_dataset()
+    write_dataset(DataTree.from_dict({"/none": study.assign(step_count=0 * study["step_count"])}), tmp_path / "none.nc")
+    inputs = {"campaign": str(tmp_path / "none.nc")}
+    draw_figure("fig2_area_and_gap", *files, inputs=inputs, arguments={"study": "none"})
+    assert pd.read_csv(files[3]).empty and "curve" in pd.read_csv(files[3])
