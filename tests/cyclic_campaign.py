@@ -91,7 +91,7 @@ def unloaded(run, between=0):
     material = icha.Material(*(float(run[name]) for name in MATERIAL))
     rows = [{name: values[k] for name, values in columns.items()} for k in range(len(at))]
     pull_off = int(np.argmin(np.where(leg == 1, p, np.inf)))
-    scalars = summarise_loop(rows, pull_off, material, 4 * max(-p[pull_off], 0.0), 0.0)
+    scalars = summarise_loop(rows, pull_off, material, 4 * max(-p[pull_off], 0.0), 0.0, 0.0)
     scalars |= {"uphill_jump_in_count": 0, "detachment_pressure": p[-2] if adhesive else 0.0}
     kept = run.drop_dims("step").assign_attrs(run.attrs)
     new = {name: ("step", values, run[name].attrs if name in run else _UNKNOWN) for name, values in columns.items()}

@@ -146,7 +146,7 @@ class Asperities:
             "grid": GRID,
             "seed": seed,
             "control": "separation",
-            **summarise_loop(rows, pull_off, self.material, largest, 0.0),
+            **summarise_loop(rows, pull_off, self.material, largest, 0.0, 0.0),
         }
         described = {"units": "1", "long_name": "test"}
         flags = {"flag_values": np.arange(4, dtype=np.int8), "flag_meanings": " ".join(EVENTS)}

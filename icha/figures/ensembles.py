@@ -216,6 +216,7 @@ class Points:
         order = np.argsort(ensemble(members[0]).mean, kind="stable")
         self.members = members[..., order]
         self.same_seeds = bool(common)
+        self.asked = np.array([group.asked for group in groups])[order]
         self._groups = groups
 
     @property
