@@ -10,6 +10,8 @@ import xarray as xr
 from icha.analysis.estimates import CONTACT, LOOP, stops_of, values_of
 from icha.analysis.left_out import INFINITE, NOT_POSITIVE, find_left_out
 from icha.analysis.polynomial_chaos import Expansion, expand
+from icha.contact.models import MODELS
+from icha.datasets import quantities
 from icha.datasets.attributes import DERIVED, combine_attributes
 from icha.datasets.build import build_dataset, stack_rows
 from icha.datasets.labels import place_of
@@ -156,3 +158,23 @@ def _indices(found: Expansion | None, at, normal, *, has_interval):
     indices = dict(zip(names, (*found.indices(found.coefficients), *widths), strict=True))
     effects = [found.main_effect(k, row, normal=normal[k]) for k, row in enumerate(at)]
     return indices | {"degree": found.degree, "unexplained": found.error, "main_effect": np.exp(effects)}
+
+
+def response_words(data: xr.Dataset, row: xr.Dataset) -> str:
+    """Return quantity, state and, if there are several, model of a result of sampled cases."""
+    words, target = quantities.quantity(str(row["response_quantity"].item())).name, int(row["response_target"])
+    if target >= 0:
+        words += f" at {quantities.state_words(*(data[key].values[target] for key in ('stop_kind', 'stop_target')))}"
+    return words + (f", {MODELS[str(row['response_model'].item())].words}" if data.sizes["model"] > 1 else "")
+
+
+def left_out_of_samples(data: xr.Dataset) -> list[str]:
+    """Return a line for each group of results that leave out the same cases, such as `pull-off pressure: 9 of 16 …`."""
+    groups: dict[str, list[str]] = {}
+    for row in (data.isel(response=k) for k in range(data.sizes.get("response", 0))):
+        groups.setdefault(str(row["left_out"].item()), []).append(response_words(data, row))
+    return [
+        f"{', '.join(results) if len(groups) > 1 else 'all results'}: {words}"
+        for words, results in groups.items()
+        if words
+    ]

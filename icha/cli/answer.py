@@ -21,33 +21,39 @@ def answer(
     of three levels of accuracy, which together need less time than boundary elements for every seed. With the key
     `accuracy`, `icha run` chooses these seeds.
     """
-    from icha.analysis.answers import answers_of, as_csv, as_latex, paragraph
-    from icha.analysis.sample_words import sample_table
+    from icha.analysis.sensitivity import left_out_of_samples
     from icha.datasets.files import read_campaign
     from icha.datasets.results import ANSWERS, SENSITIVITY
+    from icha.report.answers import answers_of, answers_table, paragraph, samples_table
 
     folder = Path(results)
     if folder.name == results and not folder.is_dir():
         folder = project() / "results" / results
-    file, sampled = folder / ANSWERS, folder / SENSITIVITY
-    if not file.is_file() and not sampled.is_file():
+    samples, estimates = (
+        {name: node.to_dataset() for name, node in read_campaign(file).children.items()} if file.is_file() else {}
+        for file in (folder / SENSITIVITY, folder / ANSWERS)
+    )
+    if not samples and not estimates:
         raise UserError(
-            f"{file}: there are no answers; expected a campaign with `levels`, with boundary elements for several "
-            "seeds, or with `sample`, that `icha run` has computed"
+            f"{folder / ANSWERS}: there are no answers; expected a campaign with `levels`, with boundary elements for "
+            "several seeds, or with `sample`, that `icha run` has computed"
         )
-    if csv or latex:
-        if not file.is_file():
-            raise UserError(f"{file}: there are no estimates with intervals; the sampled cases are in {sampled}")
-        tree = read_campaign(file)
-        echo(as_csv(tree).rstrip("\n") if csv else "\n".join(as_latex(tree)))
+    if csv:
+        import pandas as pd
+
+        from icha.datasets.table import as_csv
+
+        if not estimates:
+            raise UserError(f"{folder}: no estimates with intervals; the sampled cases are in {folder / SENSITIVITY}")
+        studies = {name: data.to_dataframe() for name, data in estimates.items()}
+        typer.echo(as_csv(pd.concat(studies, names=["study"]).reset_index("study")), nl=False)
         return
-    samples, estimates = (read_campaign(each).children if each.is_file() else {} for each in (sampled, file))
-    for node in samples.values():
-        echo(sample_table(node.to_dataset()))
-        echo()
-    for name, node in estimates.items():
-        answers = answers_of(node.to_dataset())
-        echo(paragraph(name, answers))
-        for each in answers:
-            echo("  ".join(filter(None, ("", each.contact, each.state, each.quantity, each.number))))
-        echo()
+    found = [
+        (f"{name}: {data.sizes['case']} cases", samples_table(data), left_out_of_samples(data))
+        for name, data in samples.items()
+    ]
+    answers = {name: answers_of(data) for name, data in estimates.items()}
+    found += [(paragraph(name, rows), answers_table(rows), []) for name, rows in answers.items()]
+    for head, table, left_out in found:
+        lines = [table.as_latex(), *(f"% {line}" for line in left_out)]
+        echo("\n".join(lines if latex else [head, table.as_text(), *left_out]))

@@ -115,13 +115,13 @@ def count_runs(data: Mapping[str, object], studies: Sequence[str], shown: str = 
     shown : lines that tell what the figure shows, from `texts_of`.
     """
     from icha.analysis.left_out import absent_materials, left_out_of_study
-    from icha.analysis.sample_words import left_out_lines, sample_rows
+    from icha.analysis.sensitivity import left_out_of_samples
     from icha.datasets.variables.campaign import LOADED_RUNS
 
     found: list[str] = []
     for name in studies:
         if name in getattr(data.get("sensitivity"), "children", ()):
-            found += [f"{line}." for line in left_out_lines(sample_rows(data["sensitivity"][name].to_dataset()))]
+            found += [f"{line}." for line in left_out_of_samples(data["sensitivity"][name].to_dataset())]
         if name not in getattr(data.get("campaign"), "children", ()):
             continue
         study, suffix = data["campaign"][name].to_dataset(), f" in study {name}" if len(studies) > 1 else ""

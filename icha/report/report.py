@@ -14,21 +14,19 @@ from pathlib import Path
 
 import xarray as xr
 
-from icha.analysis.answers import answers_of, paragraph
 from icha.analysis.measured_error import measured_errors
-from icha.analysis.sample_words import distribution_words, left_out_lines, sample_rows
+from icha.analysis.sensitivity import left_out_of_samples
 from icha.analysis.validity import statements_on_dataset
 from icha.checks.findings import Check
 from icha.contact.models import MODEL_PAPER
 from icha.datasets.results import figure_number
+from icha.report.answers import answers_of, answers_table, distribution_words, paragraph, samples_table
 from icha.report.spectra import picture_of_spectra
 from icha.report.tables import (
-    answers_table,
     checks_tables,
     count_runs,
     failures,
     materials_table,
-    samples_table,
     sources_table,
     studies_table,
     surfaces_table,
@@ -125,7 +123,7 @@ def _sample(data):
         "study": data.attrs["study"],
         "cases": format_count(data.sizes["case"], "case"),
         "distributions": [distribution_words(data, name) for name in data["parameter"].values.tolist()],
-        "left_out": left_out_lines(sample_rows(data)),
+        "left_out": left_out_of_samples(data),
         "table": samples_table(data),
     }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
@@ -10,14 +11,13 @@ import numpy as np
 import xarray as xr
 from markupsafe import Markup
 
-from icha.analysis.answers import Answer
 from icha.analysis.checks import worst
 from icha.analysis.left_out import left_out_of_study
-from icha.analysis.sample_words import sample_rows
 from icha.checks.findings import Check
 from icha.contact.models import MODELS
 from icha.datasets.campaign import run_place, runs_of_status
 from icha.datasets.labels import RunLabels, slopes_of
+from icha.datasets.quantities import quantity
 from icha.datasets.surface_file import measured_scale
 from icha.datasets.variables.campaign import BEYOND_MODEL, COMPUTED_RUNS, FAILED_RUNS, LOADED_RUNS, MISSING
 from icha.report.template import format_symbols
@@ -46,6 +46,32 @@ class Table(NamedTuple):
     caption: str
     head: Sequence[str]
     rows: Sequence[Sequence[object]]
+
+    def as_text(self) -> str:
+        """Return the table for a terminal."""
+        lines = [list(map(printable, row)) for row in (self.head, *self.rows)]
+        widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+        cells = ([text.ljust(width) for text, width in zip(line, widths, strict=True)] for line in lines)
+        return "\n".join([self.caption, *(f"  {'  '.join(line)}".rstrip() for line in cells)])
+
+    def as_latex(self) -> str:
+        """Return the table for LaTeX (booktabs)."""
+        head, *rows = (" & ".join(map(_latex, row)) + r" \\" for row in (self.head, *self.rows))
+        columns = "l" * len(self.head)
+        rules = [
+            rf"\begin{{tabular}}{{{columns}}}",
+            rf"\toprule {head} \midrule",
+            *rows,
+            r"\bottomrule",
+            r"\end{tabular}",
+        ]
+        return "\n".join([f"% {self.caption}", *rules])
+
+
+def _latex(text: object) -> str:
+    """Escape a text for LaTeX. A hyphen before a number becomes a minus sign."""
+    escaped = re.sub(r"([%&#_])", r"\\\1", re.sub(r"(?<!\w)-(?=\d)", "$-$", printable(text)))
+    return escaped.replace("±", r"$\pm$").replace("'", "$'$")
 
 
 def count_runs(study: xr.Dataset) -> Counter[str]:
@@ -113,21 +139,26 @@ def _list(values: list) -> str:
 
 def materials_table(studies: Mapping[str, xr.Dataset]) -> Table:
     """Return the table of all materials."""
-    units = {"contact_modulus": "Pa", "surface_energy": "J/m²", "interaction_range": "m"}
+    names = ("contact_modulus", "surface_energy", "interaction_range")
     rows = {}
     for study in studies.values():
         for material in study["material"].values.tolist():
             values = study.sel(material=material)
-            found = (_format(values[name].item(), unit) for name, unit in units.items())
-            rows[material] = (material, *found)
-    return Table("Materials", ("material", "contact modulus E*", "work of adhesion", "range"), list(rows.values()))
+            rows[material] = (material, *(_format(values[name].item(), quantity(name).unit) for name in names))
+    return Table("Materials", ("material", *(_words(name) for name in names)), list(rows.values()))
+
+
+def _words(name: str) -> Markup:
+    """Return the name and the symbol of a quantity."""
+    words = quantity(name)
+    return format_symbols(f"{words.name} {words.text}" if words.symbol else words.name)
 
 
 def _format(value: float, unit: str) -> str:
     """Format a quantity; a value that is missing or infinite is a dash."""
     if not np.isfinite(value):
         return "–"
-    return format_quantity(value, unit) if unit else f"{value:.4g}"
+    return f"{value:.4g}" if unit == "1" else format_quantity(value, unit)
 
 
 def surfaces_table(surfaces: Iterable[xr.Dataset]) -> Table:
@@ -135,33 +166,25 @@ def surfaces_table(surfaces: Iterable[xr.Dataset]) -> Table:
     seeds: dict[str, list[xr.Dataset]] = {}
     for surface in surfaces:
         seeds.setdefault(surface.attrs.get("surface", ""), []).append(surface)
-    # Variable, unit, and power with which the value scales with the heights; -1 also stands for the reciprocal.
-    columns = {
-        "period": ("period", "m", 0),
-        "roll-off": ("rolloff_wavelength", "m", 0),
-        "short cut-off": ("short_wavelength", "m", 0),
-        "Hurst exponent": ("hurst", "", 0),
-        "rms slope": ("rms_slope", "", 1),
-        "rms height": ("rms_height", "m", 1),
-        "1/rms curvature": ("rms_curvature", "m", -1),
-        "Nayak’s parameter": ("nayak_parameter", "", 0),
-    }
+    # Powers with which statistics scale with the heights. The table has the reciprocal of the curvature.
+    powers = dict.fromkeys(("period", "rolloff_wavelength", "short_wavelength", "hurst", "nayak_parameter"), 0)
+    powers |= {"rms_slope": 1, "rms_height": 1, "rms_curvature": 1}
     rows = []
     for name, members in seeds.items():
         cells = []
-        for variable, unit, power in columns.values():
-            values = [
-                (float(each[variable]) * measured_scale(each) or np.nan) ** power if power else float(each[variable])
-                for each in members
-                if variable in each
-            ]
+        for variable, power in powers.items():
+            values = [float(each[variable]) * measured_scale(each) ** power for each in members if variable in each]
+            unit = quantity(variable).unit
+            if variable == "rms_curvature":
+                values, unit = [1 / value if value else np.inf for value in values], "m"
             ends = (_format(value, unit) for value in (min(values), max(values))) if values else ("–",)
             cells.append(" to ".join(dict.fromkeys(ends)))
         first = members[0]
-        boundary, grid = first.attrs.get("boundary", "periodic"), f"{int(first['grid'])}²"
+        grid, boundary = f"{int(first['grid'])}²", first.attrs.get("boundary", "periodic")
         rows.append((name, _list(sorted(int(each["seed"]) for each in members)), boundary, grid, *cells))
     caption = "Surfaces, as measured or at the rms slope of the file. Studies scale the heights to their rms slopes"
-    return Table(caption, ("surface", "seeds", "boundary", "grid", *columns), rows)
+    *titles, curvature = map(_words, powers)
+    return Table(caption, ("surface", "seeds", "boundary", "grid", *titles, f"1/{curvature}"), rows)
 
 
 def sources_table(surfaces: Iterable[xr.Dataset]) -> Table:
@@ -182,24 +205,3 @@ def _check(check: Check) -> tuple:
     mark = '<span class="good">✓ passed</span>' if check.passed else '<span class="bad">✗ failed</span>'
     value = "not finite" if check.value < 0 else f"{check.value:.3g}"
     return check.name, format_symbols(check.description), value, f"{check.limit:g}", Markup(mark), check.subject
-
-
-def answers_table(answers: Sequence[Answer]) -> Table:
-    """Return the table of the answers of a study."""
-    rows = [(each.contact, each.state, each.quantity, each.number) for each in answers]
-    return Table("All estimates (causes of the half-width)", ("contact", "state", "quantity", "estimate"), rows)
-
-
-def samples_table(data: xr.Dataset) -> Table:
-    """Return the table of the results of sampled cases."""
-    parameters = [name.replace("_", " ") for name in data["parameter"].values.tolist()]
-    rows = [
-        (row["result"], row["cases"], row["middle"], row["range"], *row["shares"], row["unexplained"])
-        for row in sample_rows(data)
-    ]
-    return Table(
-        "Ranges contain 90 % of the cases. Shares are those of the variance of the logarithm of a result that a "
-        "parameter causes alone (first-order index), with intervals of 90 %.",
-        ("result", "cases", "middle", "range", *parameters, "unexplained"),
-        rows,
-    )

@@ -10,12 +10,15 @@ import numpy as np
 import pytest
 import small_campaign as small
 import xarray as xr
+from typer.testing import CliRunner
 
 from icha.analysis import control_variates
-from icha.analysis.answers import answers_of, as_csv, as_latex, paragraph
 from icha.analysis.estimates import estimate_campaign
+from icha.cli import app
 from icha.datasets.campaign_file import campaign_tree
+from icha.datasets.files import write_dataset
 from icha.datasets.labels import RunLabels, coarse_study
+from icha.report.answers import answers_of, answers_table, paragraph
 
 COARSE, FINE = 1.3, 1.25
 
@@ -178,17 +181,25 @@ def test_a_study_without_several_seeds_of_boundary_elements_has_no_answers():
     assert not estimate_campaign(campaign_tree([*compared.runs().items(), *one])).children
 
 
-def test_words_tables_and_latex_state_the_same_numbers(answers):
+def test_words_tables_and_latex_state_the_same_numbers(answers, tmp_path):
     rows = answers_of(answers["one"].to_dataset())
     (area,) = (a for a in rows if a.quantity == "contact area" and a.state == "p* = 0.01" and a.contact[:4] == "soft")
     assert area.unit == "%" and f"contact area {area.number}" in paragraph("one", rows)
     assert area.number.startswith(f"{area.value:.1f}"[:3])
-    table = list(csv.DictReader(io.StringIO(as_csv(answers))))
+    write_dataset(answers, tmp_path / "aggregated/answers.nc")
+
+    def icha(*options):
+        done = CliRunner().invoke(app, ["answer", str(tmp_path), *options])
+        assert done.exit_code == 0, done.output
+        return done.output
+
+    table = list(csv.DictReader(io.StringIO(icha("--csv"))))
     assert len(table) == len(rows) == answers["one"].sizes["answer"]
     wanted = {"quantity": "contact_area_fraction", "material": "soft", "stop_target": "0.01"}
     (line,) = (line for line in table if wanted.items() <= line.items())
     assert 100 * float(line["estimate"]) == pytest.approx(area.value, rel=1e-8)
-    assert sum(r"\\" in line for line in as_latex(answers)) == len(rows) + 1
+    assert sum(r"\\" in line for line in icha("--latex").splitlines()) == len(rows) + 1
+    assert paragraph("one", rows) in icha() and all(each.number in icha() for each in rows)
 
 
 def test_the_largest_cause_is_named(answers):
@@ -222,8 +233,8 @@ def test_tensile_forces_have_their_lower_end_first(answers):
     assert answer.estimate == "-58 µN ± 12 µN"
     assert answer.shares["seeds"] == pytest.approx(11.6)
     assert answers_of(force(-84e-6, -32e-6))[0].estimate == "-58 µN, from -84 to -32 µN"
-    (line,) = (line for line in as_latex(xr.DataTree.from_dict({"/one": narrow})) if "force" in line)
-    assert r"$-$58 µN $\pm$ 12 µN" in line
+    latex = answers_table([answer]).as_latex()
+    assert r"$-$58 µN $\pm$ 12 µN" in latex
 
 
 def test_only_intervals_of_loads_pass_zero():

@@ -7,7 +7,6 @@ import small_campaign as small
 import xarray as xr
 from sampled_cases import COUNT, sampled
 
-from icha.analysis.answers import answers_of
 from icha.analysis.checks import check_campaign
 from icha.analysis.estimates import estimate_campaign
 from icha.analysis.left_out import (
@@ -19,8 +18,7 @@ from icha.analysis.left_out import (
     left_out_of_study,
     too_few,
 )
-from icha.analysis.sample_words import sample_rows, sample_table
-from icha.analysis.sensitivity import sensitivity_of_campaign
+from icha.analysis.sensitivity import left_out_of_samples, sensitivity_of_campaign
 from icha.checks.run import attributes_of_failure, check_run
 from icha.datasets.campaign import select_run
 from icha.datasets.campaign_file import campaign_tree
@@ -29,6 +27,7 @@ from icha.datasets.table import tidy_table
 from icha.figures import fig14_pull_off, fig15_loss, fig21_sensitivity, fig22_parameters
 from icha.figures.captions import count_runs
 from icha.figures.looks import FEWER_SEEDS
+from icha.report.answers import answers_of, samples_table
 
 ENERGY = 1e-3 * np.array([1, 2, 3, 4, 5, 6, 7, 8, 8.5, 9.3, 10, 11, 12, 13, 14, 15])
 WORDS = "9 of 16 cases; 7 failed a check, all with surface energy above 9.2 mJ/m²"
@@ -82,13 +81,12 @@ def without_the_stickiest():
 def test_sampled_cases_state_what_they_leave_out(without_the_stickiest):
     data = without_the_stickiest["one"].to_dataset()
     used = COUNT * 3 // 4
-    rows = sample_rows(data)
-    for row in rows:
-        assert row["cases"] == str(used) and row["range"] == "not stated" and row["middle"].endswith("(biased)")
-        assert row["left_out"].startswith(f"{used} of {COUNT} cases; 16 failed a check, all with surface energy above ")
-        assert not any("±" in share for share in row["shares"])
+    for _, cases, middle, interval, *shares in samples_table(data).rows:
+        assert cases == str(used) and interval == "not stated" and middle.endswith("(biased)")
+        assert not any("±" in share for share in shares)
     assert np.isnan(data["low"]).all() and np.isnan(data["first_order_half_width"]).all()
-    assert f"all results: {used} of {COUNT} cases; 16 failed" in sample_table(data)
+    (line,) = left_out_of_samples(data)
+    assert line.startswith(f"all results: {used} of {COUNT} cases; 16 failed a check, all with surface energy above ")
     caption = count_runs({"sensitivity": without_the_stickiest}, ["one"])
     assert caption.startswith(f"all results: {used} of {COUNT} cases") and "no interval is stated" in caption
     for module in (fig21_sensitivity, fig22_parameters):

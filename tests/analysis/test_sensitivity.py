@@ -8,11 +8,11 @@ import pytest
 from sampled_cases import COUNT, sampled
 
 from icha.analysis.estimates import estimate_campaign
-from icha.analysis.sample_words import distribution_words, sample_rows, sample_table
 from icha.analysis.sensitivity import sensitivity_of_campaign
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import inputs_study
 from icha.figures import fig21_sensitivity, fig22_parameters
+from icha.report.answers import distribution_words, samples_table
 
 
 @pytest.fixture(scope="module")
@@ -67,11 +67,10 @@ def test_full_contact_is_left_out_of_the_stiffness_alone():
 
 def test_words_and_figures_state_the_indices(tree):
     data = tree["one"].to_dataset()
-    rows = sample_rows(data)
-    assert rows[-1]["shares"] == ["", ""]
-    (area,) = (row for row in rows if row["result"] == "contact area at p* = 0.01")
-    assert area["shares"][0].startswith("44 ± ") and area["unexplained"].endswith(" %")
-    assert all(text in sample_table(data) for text in ("64 cases", "hurst", area["range"]))
+    table = samples_table(data)
+    assert table.head[4:6] == ("Hurst exponent", "surface energy") and tuple(table.rows[-1][4:6]) == ("", "")
+    (area,) = (row for row in table.rows if row[0] == "contact area at p* = 0.01")
+    assert area[4].startswith("44 ± ") and area[6].endswith(" %") and area[3] in table.as_text()
     panels = fig21_sensitivity.figure(tree, study="one").axes
     shown = [bar.get_width() for bar in panels[0].patches]
     np.testing.assert_allclose(shown[:2], [43.65, 56.35], atol=0.1)

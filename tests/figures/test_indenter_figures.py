@@ -152,7 +152,7 @@ def test_states_beyond_jkr_do_not_spoil_the_axes_and_spheres_of_long_range_have_
     tree = tree_of(run)
     write_dataset(run, tmp_path / "run.nc")
     shown = CliRunner().invoke(app, ["show", str(tmp_path / "run.nc")]).output
-    assert "approach no fit (Tabor parameter 0.3 below 3)" in shown
+    assert "work of adhesion on approach: no fit (Tabor parameter 0.3 below 3)" in shown
     figure = fig18_jkr_plot.figure(tree, study="press")
     lowest = min(line[:, 0].min() for ax in figure.axes for line in lines(ax))
     factor = {"k": 1e-3, "N": 1.0}[figure.axes[0].get_xlabel().split("(")[1][0]]

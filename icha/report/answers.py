@@ -1,8 +1,8 @@
 """The answers of a campaign in words: each estimate with its interval, what limits it, and what would narrow it."""
 
+from __future__ import annotations
+
 import math
-import re
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -10,9 +10,12 @@ import xarray as xr
 
 from icha.analysis.control_variates import PROBABILITY
 from icha.analysis.estimates import LOOP
-from icha.datasets import table
+from icha.analysis.sensitivity import response_words
 from icha.datasets.quantities import quantity, state_words
 from icha.path.targets import OF_SQUARES, PER_NOMINAL_AREA
+from icha.report.tables import Table
+from icha.support.distributions import KINDS
+from icha.support.formatting import format_quantity
 
 _LEVELS = {
     "asperity_seeds": "the asperity model",
@@ -97,14 +100,9 @@ def _answer(row: xr.Dataset) -> Answer:
     described, value = quantity(str(row["quantity"].item())), float(row["estimate"])
     factor, unit = described.in_unit(0.0 if math.isnan(value) else value)
     shares = {name: float(row[f"share_{name}"]) for name in ("seeds", "model", "refinement", "grid", "inputs")}
-    known = {name: 0.0 if math.isnan(share) else share for name, share in shares.items()}
-    causes = {"seeds": math.hypot(known["seeds"], known["refinement"])}
-    if row["asperity_seeds"]:
-        causes["model"] = known["model"]
-    if not math.isnan(shares["grid"]):
-        causes["grid"] = known["grid"]
-    if not math.isnan(shares["inputs"]):
-        causes["inputs"] = known["inputs"]
+    causes = {"seeds": np.hypot(*np.nan_to_num([shares["seeds"], shares["refinement"]]))}
+    causes |= {"model": np.nan_to_num(shares["model"])} if row["asperity_seeds"] else {}
+    causes |= {name: shares[name] for name in ("grid", "inputs") if not math.isnan(shares[name])}
     kind = str(row["stop_kind"].item())
     notes = [str(row["left_out"].item()) if "left_out" in row else ""]  # not in results of earlier versions
     if row["full_contact_seeds"]:
@@ -128,33 +126,27 @@ def _limit(row, shares):
     """Return a sentence on what limits the accuracy, and how the interval would narrow with twice as many seeds."""
     if math.isnan(float(row["estimate_low"])):
         return "The runs that are left out limit the accuracy."
-    sources = {"asperity_seeds": "seeds", "coarse_seeds": "model", "fine_seeds": "refinement"}
-    present = {level: int(row[level]) for level in sources if int(row[level])}
-    cheapest, *others = present
-    variances = {cheapest: shares["seeds"] ** 2} | {
-        level: shares["model" if cheapest == "asperity_seeds" and level == others[0] else "refinement"] ** 2
-        for level in others
-    }
-    grid = 0.0 if math.isnan(shares["grid"]) else shares["grid"] ** 2
-    inputs = 0.0 if math.isnan(shares["inputs"]) else shares["inputs"] ** 2
-    total = sum(variances.values()) + grid + inputs
-    if inputs > max(*variances.values(), grid):
-        return (
-            f"The sampled parameters limit the accuracy: ± {100 * math.sqrt(inputs):.2g} % of the value. Better known "
-            "parameters would narrow it; more seeds would not."
-        )
+    levels = [level for level in _LEVELS if row[level]]
+    # The cheapest level has the scatter of the seeds, and each further level that of its difference from the last one.
+    causes = ["seeds", "model" if levels[0] == "asperity_seeds" else "refinement", "refinement"]
+    variances = {level: shares[cause] ** 2 for level, cause in zip(levels, causes, strict=False)}
+    variances |= {cause: 0.0 if math.isnan(shares[cause]) else shares[cause] ** 2 for cause in ("grid", "inputs")}
+    total, level = sum(variances.values()), max(variances, key=variances.__getitem__)
     if not total:
         return "The seeds do not differ, and no other error is known."
-    if grid > max(variances.values()):
+    width = f"± {100 * math.sqrt(variances[level]):.2g} % of the value"
+    if level == "inputs":
         return (
-            f"The grid limits the accuracy: ± {100 * math.sqrt(grid):.2g} % of the value. A finer grid would narrow it."
+            f"The sampled parameters limit the accuracy: {width}. Better known parameters would narrow it; more seeds "
+            "would not."
         )
-    level = max(variances, key=variances.__getitem__)
-    narrower = math.sqrt((total - variances[level] / 2) / total)
+    if level == "grid":
+        return f"The grid limits the accuracy: {width}. A finer grid would narrow it."
+    narrower = 1 - math.sqrt((total - variances[level] / 2) / total)
     unknown = " The error of the grid is unknown." if math.isnan(shares["grid"]) else ""
     return (
-        f"The {present[level]} seeds of {_LEVELS[level]} limit the accuracy: with twice as many, the interval would be "
-        f"{100 * (1 - narrower):.0f} % narrower.{unknown}"
+        f"The {int(row[level])} seeds of {_LEVELS[level]} limit the accuracy: with twice as many, the interval would "
+        f"be {100 * narrower:.0f} % narrower.{unknown}"
     )
 
 
@@ -176,28 +168,48 @@ def paragraph(name: str, answers: list[Answer]) -> str:
     )
 
 
-def as_csv(answers: xr.DataTree) -> str:
-    """Return all answers as a table in CSV, with one line of names."""
-    import pandas as pd
-
-    frames = {
-        study: pd.DataFrame({name: v.values for name, v in node.data_vars.items()})
-        for study, node in answers.children.items()
-    }
-    return table.as_csv(pd.concat(frames, names=["study"]).reset_index(level="study"))
+def answers_table(answers: list[Answer]) -> Table:
+    """Return the table of the answers of a study."""
+    rows = [(each.contact, each.state, each.quantity, each.number) for each in answers]
+    return Table("All estimates (causes of the half-width)", ("contact", "state", "quantity", "estimate"), rows)
 
 
-def as_latex(answers: xr.DataTree) -> Iterator[str]:
-    """Yield the lines of a LaTeX table (booktabs) for each study."""
-    for study, node in answers.children.items():
-        yield f"% study {study}"
-        yield r"\begin{tabular}{llll}"
-        yield r"\toprule contact & state & quantity & estimate \\ \midrule"
-        for each in answers_of(node.to_dataset()):
-            # A hyphen in text mode would look shorter than a minus sign; exponents such as 1e-05 stay.
-            estimate = re.sub(r"(?<!e)-", "$-$", each.estimate)
-            number = f"{estimate}{each.note}".replace("%", r"\%").replace("±", r"$\pm$")
-            cells = [text.replace("_", r"\_").replace("'", "$'$") for text in (each.contact, each.state, each.quantity)]
-            yield " & ".join([*cells, number]) + r" \\"
-        yield r"\bottomrule"
-        yield r"\end{tabular}"
+def samples_table(data: xr.Dataset) -> Table:
+    """Return the table of the results of sampled cases: middle, range, and what share each parameter causes."""
+    rows = []
+    for k in range(data.sizes.get("response", 0)):
+        row = data.isel(response=k)
+        factor, unit = quantity(str(row["response_quantity"].item())).in_unit(float(row["middle"]))
+        low, middle, high = (f"{float(f'{float(row[name]) * factor:.3g}'):g}" for name in ("low", "middle", "high"))
+        biased, error = " (biased)" if row["biased"] else "", float(row["unexplained"])
+        halves = ("" if math.isnan(half) else f" ± {100 * half:.0f}" for half in row["first_order_half_width"].values)
+        shares = (
+            "" if math.isnan(share) else f"{100 * share:.0f}{half} %{biased}"
+            for share, half in zip(row["first_order"].values, halves, strict=True)
+        )
+        rows.append(
+            (
+                response_words(data, row),
+                str(int(row["case_count"])),
+                f"{middle} {unit}".strip() + biased,
+                "not stated" if low == "nan" else f"{low} to {high} {unit}".strip() + biased,
+                *shares,
+                "" if math.isnan(error) else f"{100 * min(error, 1):.2g} %",
+            )
+        )
+    names = (quantity(name).name for name in data["parameter"].values.tolist())
+    return Table(
+        "Columns of parameters: share of the variance of the logarithm that the parameter alone causes",
+        ("result", "cases", "middle", "90 % of cases", *names, "unexplained"),
+        rows,
+    )
+
+
+def distribution_words(data: xr.Dataset, name: str) -> str:
+    """Describe the distribution of a parameter, such as `Hurst exponent: uniform, lower end 0.5, upper end 0.9`."""
+    attributes = data[name].attrs
+    kind, numbers = attributes["distribution"], attributes["distribution_numbers"]
+    units = (attributes["units"], "1" if kind == "lognormal" else attributes["units"])
+    texts = (f"{n:g}" if unit == "1" else format_quantity(n, unit) for n, unit in zip(numbers, units, strict=True))
+    described = ", ".join(f"{words} {text}" for words, text in zip(KINDS[kind], texts, strict=True))
+    return f"{quantity(name).name}: {kind}, {described}"
