@@ -53,7 +53,7 @@ def test_modules_on_the_page_on_the_model_exist():
     ("module", "line", "broken"),
     [
         ("path/targets.py", "import icha.simulation", "Data flows one way"),
-        ("simulation.py", "import snakemake", "The physics knows nothing of the workflow"),
+        ("simulation/record.py", "import snakemake", "The physics knows nothing of the workflow"),
     ],
 )
 def test_a_reversed_import_is_refused(module, line, broken, tmp_path):

@@ -186,7 +186,7 @@ def test_an_impossible_state_is_a_failed_run(sweep, path):
 
 @pytest.mark.parametrize("error", [ZeroDivisionError("division by zero"), np.linalg.LinAlgError("singular matrix")])
 def test_any_error_of_the_computation_is_a_failed_run(sweep, monkeypatch, error):
-    monkeypatch.setattr("icha.simulation.follow", Mock(side_effect=error))
+    monkeypatch.setattr("icha.simulation.record.follow", Mock(side_effect=error))
     file, said = sweep("odd", BARE)
     run = read_run(file)
     assert str(error) in run.attrs["incomplete"] and run.sizes["step"] == 0
@@ -212,7 +212,7 @@ def test_values_that_are_not_finite_end_a_run_and_keep_the_steps_before(sweep, d
     "error", [MemoryError("no room"), OSError(28, "No space left on device"), RuntimeError("can't start new thread")]
 )
 def test_errors_of_the_machine_write_no_result(sweep, tmp_path, monkeypatch, error):
-    monkeypatch.setattr("icha.simulation.follow", Mock(side_effect=error))
+    monkeypatch.setattr("icha.simulation.record.follow", Mock(side_effect=error))
     with pytest.raises(type(error)):
         sweep("wrong", BARE)
     assert not (tmp_path / "wrong.nc").exists()
