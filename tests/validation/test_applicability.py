@@ -4,9 +4,9 @@ import math
 
 import pytest
 
+from icha.checks.applicability import asperity_applicability
 from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
 from icha.path.targets import largest_area_fraction
-from icha.checks.applicability import asperity_applicability
 from validation.applicability import COUNT, WRONG_FACTOR, State, case, largest_factor, press, reference, states
 
 # Numbers of a random surface, a random surface with Gaussian amplitudes and two waves: U_full/dgamma is 1.5, 2.1, 1.4.
