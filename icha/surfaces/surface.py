@@ -126,23 +126,6 @@ class Surface:
         for text in unusual_arguments({"period": self.period} | ({} if self.smooth else {"rms_slope": self.rms_slope})):
             warnings.warn(text, IchaWarning, stacklevel=3)
 
-    def detrended(self, degree: int = 1) -> Surface:
-        """Return a free square without its tilt (`degree` 1), or also without its curvature (`degree` 2)."""
-        from icha.surfaces.measured.defects import without_trend
-
-        if degree not in (1, 2):
-            raise ValueError(f"degree: {degree!r} must be 1 or 2")
-        if not self.free:
-            raise ValueError(f"boundary: {self.boundary!r}; a periodic surface has no trend; expected {FREE!r}")
-        return replace(self, heights=without_trend(self.heights, degree))
-
-    def power_spectrum(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return wave numbers q, rad/m, and the radial power spectrum C(q), m^4, of the roughness."""
-        from icha.surfaces.moments import radial_power_spectrum
-
-        q, power, _ = radial_power_spectrum(self)
-        return q, power
-
     def plot(self, axes=None):
         """Draw a map of the heights; return the axes of matplotlib. `axes` None stands for new axes."""
         import matplotlib.pyplot as plt

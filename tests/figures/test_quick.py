@@ -43,26 +43,11 @@ def test_surfaces_can_be_drawn_and_looked_at():
     surface = small.surface()
     assert "<caption>Surface</caption>" in surface._repr_html_() and "32 × 32" in surface._repr_html_()
     assert surface.plot().images[0].get_array().shape == (32, 32)
-    q, power = surface.power_spectrum()
-    assert len(q) == len(power) and np.all(np.diff(q) > 0)
     lens = icha.Surface(surface.heights, surface.period, "free", icha.Sphere(1e-2))
     assert "shape" in lens._repr_html_() and lens.plot().images
     assert "contact modulus" in small.MATERIALS["soft"]._repr_html_()
     assert "thickness" in icha.Material(1e6, 0.0, thickness=1e-4)._repr_html_()
     assert "pressures" in icha.Path(pressures=[1e3], unload=True)._repr_html_()
-
-
-def test_a_free_square_loses_its_tilt_and_its_curvature():
-    y, x = np.mgrid[-1:1:32j, -1:1:32j]
-    rough = small.surface().heights
-    tilted = icha.Surface(rough + 1e-6 * x + 2e-6 * y**2, 1e-4, "free")
-    flat = icha.Surface(rough, 1e-4, "free")
-    np.testing.assert_allclose(tilted.detrended(2).heights, flat.detrended(2).heights, atol=1e-15)
-    assert np.polyfit(x.ravel(), tilted.detrended().heights.ravel(), 1)[0] == pytest.approx(0, abs=1e-12)
-    with pytest.raises(ValueError, match="degree: 3 must be 1 or 2"):
-        tilted.detrended(3)
-    with pytest.raises(ValueError, match="a periodic surface has no trend"):
-        small.surface().detrended()
 
 
 def test_the_logger_reports_every_target(caplog):
