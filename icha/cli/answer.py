@@ -24,7 +24,7 @@ def answer(
     from icha.analysis.sensitivity import left_out_of_samples
     from icha.datasets.files import read_campaign
     from icha.datasets.results import ANSWERS, SENSITIVITY
-    from icha.report.answers import answers_of, answers_table, paragraph, samples_table
+    from icha.report.answers import answers_of, answers_table, samples_table, sentences
 
     folder = Path(results)
     if folder.name == results and not folder.is_dir():
@@ -53,7 +53,7 @@ def answer(
         for name, data in samples.items()
     ]
     answers = {name: answers_of(data) for name, data in estimates.items()}
-    found += [(paragraph(name, rows), answers_table(rows), []) for name, rows in answers.items()]
+    found += [("\n".join([f"{name}:", *sentences(rows)]), answers_table(rows), []) for name, rows in answers.items()]
     for head, table, left_out in found:
         lines = [table.as_latex(), *(f"% {line}" for line in left_out)]
         echo("\n".join(lines if latex else [head, table.as_text(), *left_out]))

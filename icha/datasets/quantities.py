@@ -107,6 +107,8 @@ _QUANTITIES = {
     "rolloff_wavelength": Quantity("roll-off wavelength", r"\lambda_{\mathrm{r}}", "m"),
     "short_wavelength": Quantity("shortest wavelength", r"\lambda_{\mathrm{s}}", "m"),
     "cutoff": Quantity("cutoff wavelength", r"\lambda_{\mathrm{c}}", "m"),
+    "rms_curvature": Quantity("rms curvature", "", "m^-1"),
+    "nayak_parameter": Quantity("Nayak’s parameter"),
     "period": Quantity("period", "L", "m"),
     "grid": Quantity("grid", "n"),
 }

@@ -150,22 +150,17 @@ def _limit(row, shares):
     )
 
 
-def paragraph(name: str, answers: list[Answer]) -> str:
-    """Return one paragraph on the answers of a study: the last state of each contact, and what limits it."""
+def sentences(answers: list[Answer]) -> list[str]:
+    """Return sentences on the answers of a study: the last state of each contact and what limits it; the intervals."""
     found = []
     for contact in dict.fromkeys(each.contact for each in answers):
         of_contact = [each for each in answers if each.contact == contact]
         state = next((each.state for each in reversed(of_contact) if each.state), "")
         main = [each for each in of_contact if each.state in (state, "")][:2]
         numbers = "; ".join(f"{each.quantity} {each.number}" for each in main)
-        at = f" at {state}" if state else ""
-        found.append(f"{contact}{at}: {numbers}. {main[0].limit}")
+        found.append(f"{contact}{f' at {state}' if state else ''}: {numbers}. {main[0].limit}")
     inputs = " They include the scatter of the sampled parameters." if "inputs" in answers[0].shares else ""
-    return (
-        f"{name}: "
-        + " ".join(found)
-        + f" Intervals contain the mean over all realisations in {100 * PROBABILITY:g} % of cases.{inputs}"
-    )
+    return [*found, f"Intervals contain the mean over all realisations in {100 * PROBABILITY:g} % of cases.{inputs}"]
 
 
 def answers_table(answers: list[Answer]) -> Table:

@@ -20,7 +20,7 @@ from icha.analysis.validity import statements_on_dataset
 from icha.checks.findings import Check
 from icha.contact.models import MODEL_PAPER
 from icha.datasets.results import figure_number
-from icha.report.answers import answers_of, answers_table, distribution_words, paragraph, samples_table
+from icha.report.answers import answers_of, answers_table, distribution_words, samples_table, sentences
 from icha.report.spectra import picture_of_spectra
 from icha.report.tables import (
     checks_tables,
@@ -112,9 +112,9 @@ def write_report(
 
 
 def _answers(name, node):
-    """Return the answers of a study for the page: name, paragraph and table."""
+    """Return the answers of a study for the page: name, sentences and table."""
     rows = answers_of(node.to_dataset())
-    return {"study": name, "paragraph": paragraph(name, rows).partition(": ")[2], "table": answers_table(rows)}
+    return {"study": name, "sentences": sentences(rows), "table": answers_table(rows)}
 
 
 def _sample(data):

@@ -17,6 +17,7 @@ SYMBOLS = {
     r"\bh_rms": "<i>h</i><sub>rms</sub>",
     r"\bE\*": "<i>E</i><sup>∗</sup>",
     r"\bA0\b": "<i>A</i><sub>0</sub>",
+    r"λ_(\w)": r"<i>λ</i><sub>\1</sub>",
 }
 
 

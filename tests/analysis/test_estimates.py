@@ -18,7 +18,7 @@ from icha.cli import app
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import write_dataset
 from icha.datasets.labels import RunLabels, coarse_study
-from icha.report.answers import answers_of, answers_table, paragraph
+from icha.report.answers import answers_of, answers_table, sentences
 
 COARSE, FINE = 1.3, 1.25
 
@@ -184,7 +184,7 @@ def test_a_study_without_several_seeds_of_boundary_elements_has_no_answers():
 def test_words_tables_and_latex_state_the_same_numbers(answers, tmp_path):
     rows = answers_of(answers["one"].to_dataset())
     (area,) = (a for a in rows if a.quantity == "contact area" and a.state == "p* = 0.01" and a.contact[:4] == "soft")
-    assert area.unit == "%" and f"contact area {area.number}" in paragraph("one", rows)
+    assert area.unit == "%" and f"contact area {area.number}" in " ".join(sentences(rows))
     assert area.number.startswith(f"{area.value:.1f}"[:3])
     write_dataset(answers, tmp_path / "aggregated/answers.nc")
 
@@ -199,7 +199,7 @@ def test_words_tables_and_latex_state_the_same_numbers(answers, tmp_path):
     (line,) = (line for line in table if wanted.items() <= line.items())
     assert 100 * float(line["estimate"]) == pytest.approx(area.value, rel=1e-8)
     assert sum(r"\\" in line for line in icha("--latex").splitlines()) == len(rows) + 1
-    assert paragraph("one", rows) in icha() and all(each.number in icha() for each in rows)
+    assert "\n".join(sentences(rows)) in icha() and all(each.number in icha() for each in rows)
 
 
 def test_the_largest_cause_is_named(answers):
