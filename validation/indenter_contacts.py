@@ -19,6 +19,7 @@ from icha.contact.model import PRESSURE, Control
 from icha.references import indentation as exact
 from icha.surfaces.shapes import Cone, CylinderPunch, FlatPunch, Paraboloid, Shape, Wave
 from icha.surfaces.surface import Surface
+from validation import elliptic_contacts as elliptic
 from validation.single_contacts import force_and_area, largest_tension
 
 # Tabor parameter 5: the range affects only the jump into contact.
@@ -201,7 +202,7 @@ def ellipse(spacing: float, ratio: float, grid: int = 96) -> Iterator[dict]:
     radii = (math.sqrt(ratio), math.sqrt(1 / ratio))
     hertz = indenter(Paraboloid(radii), grid, spacing, BARE)
     for force in (4.0, 16.0):
-        wanted = exact.elliptic_hertz_contact(force, radii, 1.0)
+        wanted = elliptic.elliptic_hertz_contact(force, radii, 1.0)
         state = hertz.equilibrium(hertz.untouched(), -float(wanted.indentation))
         yield _ellipse_row("Hertz", ratio, spacing, hertz, state, wanted, float(wanted.force))
     contact = indenter(Paraboloid(radii), grid, spacing)
@@ -213,7 +214,7 @@ def ellipse(spacing: float, ratio: float, grid: int = 96) -> Iterator[dict]:
             yield _ellipse_row(criterion, ratio, spacing, contact, state, wanted, PULL_OFF)
     tension, _ = largest_tension(contact, state, 0.05)
     for criterion in ("energy", "axes"):
-        off = exact.elliptic_pull_off(radii, 1.0, 1.0, criterion)
+        off = elliptic.elliptic_pull_off(radii, 1.0, 1.0, criterion)
         yield {"model": criterion, "ratio": ratio, "pull_off_error": tension / -float(off.force) - 1}
 
 
@@ -221,12 +222,12 @@ def _ellipse_at(indentation, radii, criterion):
     """Return the stable state of an elliptic front at an indentation."""
 
     def state(axis_ratio):
-        return exact.elliptic_jkr_contact(axis_ratio, radii, 1.0, 1.0, criterion)
+        return elliptic.elliptic_jkr_contact(axis_ratio, radii, 1.0, 1.0, criterion)
 
-    flattest = float(exact.elliptic_pull_off(radii, 1.0, 1.0, criterion).semi_axes[1])
-    flattest /= float(exact.elliptic_pull_off(radii, 1.0, 1.0, criterion).semi_axes[0])
+    flattest = float(elliptic.elliptic_pull_off(radii, 1.0, 1.0, criterion).semi_axes[1])
+    flattest /= float(elliptic.elliptic_pull_off(radii, 1.0, 1.0, criterion).semi_axes[0])
     flattest = min(flattest, 1 / flattest)
-    limit = exact.elliptic_hertz_contact(1.0, radii, 1.0).semi_axes
+    limit = elliptic.elliptic_hertz_contact(1.0, radii, 1.0).semi_axes
     limit = min(limit[0] / limit[1], limit[1] / limit[0])
     found = brentq(lambda g: float(state(g).indentation) - indentation, limit * (1 + 1e-5), flattest)
     return state(found)
@@ -367,7 +368,7 @@ def ripples_along(cells: float, waves: int, indentation: float = 2.0) -> dict:
     # The same ripples under a circular contact: p with K = (m + 1) c E* h/sqrt(pi a), c = int t^(m+1)/sqrt(1 - t^2).
     c = math.sqrt(math.pi) / 2 * gamma(waves / 2 + 1) / gamma(waves / 2 + 1.5)
     circle = -(waves + 1) * c * amplitude / math.sqrt(math.pi * a)
-    straight = float(exact.front_response(amplitude, wavelength, 1.0).real)
+    straight = float(elliptic.front_response(amplitude, wavelength, 1.0).real)
     return {
         "cells": cells,
         "waves": waves,
@@ -396,7 +397,7 @@ def ripples_across(spacing: float, amplitude: float, wavelength: float) -> dict:
     columns = np.column_stack([np.cos(phase), np.sin(phase), np.ones_like(a), a - a.mean()])
     cosine, sine = np.linalg.lstsq(columns, found)[0][:2]
     # Re(K exp(i q a)) = K' cos(q a) - K'' sin(q a).
-    response = complex(cosine, -sine) / exact.front_response(amplitude, wavelength, 1.0, math.pi / 2)
+    response = complex(cosine, -sine) / elliptic.front_response(amplitude, wavelength, 1.0, math.pi / 2)
     return {
         "cells": 1.6 / spacing,
         "wave_cells": wavelength / spacing,
