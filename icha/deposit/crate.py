@@ -14,7 +14,7 @@ from icha.configuration.load import INPUTS
 from icha.configuration.publication import Author, Publication
 from icha.contact.models import MODEL_PAPER
 from icha.datasets.results import CONFIGURATION
-from icha.deposit.metadata import TABLES, find_licence, web_address, without_empty
+from icha.deposit.metadata import TABLES, licence_address, web_address, without_empty
 from icha.deposit.verify import COMPUTED, CRATE, SOURCE
 
 _VERSION = "https://w3id.org/ro/crate/1.1"
@@ -37,7 +37,7 @@ def write_crate(
     """
     shown = [path for path in sorted(sizes) if not path.startswith(_PROGRAM) or path == _LICENCE]
     authors = [_author(author) for author in publication.authors]
-    licence = find_licence(publication.license)
+    licence = licence_address(publication.license)
     describes = {"conformsTo": {"@id": _VERSION}, "about": {"@id": "./"}}
     root = {
         "name": publication.title,
@@ -47,7 +47,7 @@ def write_crate(
         "version": publication.version,
         "keywords": publication.keywords,
         "identifier": publication.doi and web_address(publication.doi),
-        "license": {"@id": licence.address},
+        "license": {"@id": licence},
         "author": [{"@id": author["@id"]} for author, *_ in authors],
         "citation": {"@id": MODEL_PAPER.address},
         "hasPart": [{"@id": _PROGRAM}, *_files(shown)],
@@ -70,7 +70,7 @@ def write_crate(
     entities = [
         _entity(CRATE, "CreativeWork", **describes),
         _entity("./", "Dataset", **root),
-        _entity(licence.address, "CreativeWork", name=licence.name, identifier=licence.identifier),
+        _entity(licence, "CreativeWork", name=publication.license),
         *(entity for each in authors for entity in each),
         _entity(MODEL_PAPER.address, "ScholarlyArticle", name=MODEL_PAPER.line),
         _entity(_PROGRAM, ["Dataset", "SoftwareApplication"], **program),

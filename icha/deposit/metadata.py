@@ -1,10 +1,10 @@
-"""Metadata of a deposit: licence, CITATION.cff, metadata for Zenodo, attributes of the campaign dataset."""
+"""Metadata of a deposit: licence, CITATION.cff, metadata for Zenodo."""
 
 import json
 import re
 from html import escape
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import yaml
 from packaging.licenses import InvalidLicenseExpression, canonicalize_license_expression
@@ -17,44 +17,32 @@ from icha.deposit.verify import ZENODO, read_text
 TABLES = yaml.safe_load(Path(__file__).with_name("tables.yaml").read_text(encoding="utf-8"))
 
 
-class Licence(NamedTuple):
-    """A licence of data: SPDX identifier, name and web address."""
-
-    identifier: str
-    name: str
-    address: str
+# Common licences of data, which every reader of CITATION.cff knows; the format accepts only the SPDX licences of 2021.
+COMMON_LICENCES = ("CC-BY-4.0", "CC-BY-SA-4.0", "CC0-1.0", "ODbL-1.0")
 
 
-def find_licence(identifier: str) -> Licence:
-    """Return the licence with an SPDX identifier.
-
-    Raises
-    ------
-    ValueError
-        If the identifier is not an SPDX identifier of a single licence, or has another spelling than in SPDX.
-    """
-    try:
-        found = canonicalize_license_expression(identifier)
-    except InvalidLicenseExpression:
-        found = ""
-    if not re.fullmatch(r"(?!LicenseRef-)[A-Za-z0-9.-]+", found):
-        raise ValueError(
-            "is not a licence in the SPDX list; expected one identifier of https://spdx.org/licenses, for data usually "
-            f"{' or '.join(TABLES['licences'])}"
-        )
-    if identifier != found:
-        raise ValueError(f"has another spelling in the SPDX list; expected {found!r}")
-    return Licence(found, *TABLES["licences"].get(found, (found, f"https://spdx.org/licenses/{found}.html")))
+def licence_address(identifier: str) -> str:
+    """Return the web address of the text of a licence with an SPDX identifier."""
+    return f"https://spdx.org/licenses/{identifier}.html"
 
 
 def licence_problem(campaign: Campaign) -> tuple[str, str] | None:
-    """Return configuration key and text of a problem with the licence of the data; None if there is no problem."""
+    """Return configuration key and text of a problem with the licence of the data; None if there is no problem.
+
+    The licence must be the SPDX identifier of a single licence, with the spelling in SPDX.
+    """
     licence = campaign.deposit_metadata().license
+    key = "publication.license" if campaign.publication.license else "license"
     try:
-        find_licence(licence)
-    except ValueError as error:
-        return "publication.license" if campaign.publication.license else "license", f"{licence!r} {error}"
-    return None
+        found = canonicalize_license_expression(licence)
+    except InvalidLicenseExpression:
+        found = ""
+    if not re.fullmatch(r"(?!LicenseRef-)[A-Za-z0-9.-]+", found):
+        return key, (
+            f"{licence!r} is not a licence in the SPDX list; expected one identifier of https://spdx.org/licenses, for "
+            f"data usually {' or '.join(COMMON_LICENCES)}"
+        )
+    return (key, f"{licence!r} has another spelling in the SPDX list; expected {found!r}") if licence != found else None
 
 
 def acknowledgement(funding: Funding) -> str:
@@ -63,25 +51,6 @@ def acknowledgement(funding: Funding) -> str:
     award = ": ".join(filter(None, (number, funding.award_title)))
     award = ", ".join(filter(None, (award, funding.award_url and web_address(funding.award_url))))
     return f"Funded by {funding.funder}{f' ({award})' if award else ''}"
-
-
-def discovery_attributes(publication: Publication) -> dict[str, str]:
-    """Return attributes of the Attribute Convention for Data Discovery (ACDD 1.3) that describe a publication.
-
-    Semicolons separate creators, because names contain commas. Every attribute lists the creators in the same order.
-    """
-    authors = publication.authors
-    values = {
-        "creator_name": [author.full_name for author in authors],
-        "creator_type": ["person" if author.is_person else "institution" for author in authors],
-        "creator_url": [author.orcid_address or author.ror or "" for author in authors],
-        "creator_institution": [author.affiliation or "" for author in authors],
-        "keywords": [", ".join(publication.keywords)],
-        "product_version": [publication.version or ""],
-        "acknowledgement": [acknowledgement(each) for each in publication.funding],
-        "metadata_link": [f"https://doi.org/{publication.doi}" if publication.doi else ""],
-    }
-    return {name: "; ".join(texts) for name, texts in values.items() if any(texts)}
 
 
 def web_address(identifier: str) -> str:
@@ -99,7 +68,7 @@ def citation_cff(publication: Publication, revision: str) -> str:
     publication : complete metadata (`icha.configuration.publication.missing_metadata`).
     revision : revision of the program that made the data.
     """
-    licence = find_licence(publication.license)
+    is_common = publication.license in COMMON_LICENCES
     paper = {
         "type": "article",
         "title": MODEL_PAPER.title,
@@ -116,9 +85,8 @@ def citation_cff(publication: Publication, revision: str) -> str:
         "authors": [_cff_author(author) for author in publication.authors],
         "version": publication.version,
         "date-released": publication.date,
-        # The format accepts only the SPDX licences of 2021. Any other licence is given by its web address.
-        "license": licence.identifier if licence.identifier in TABLES["licences"] else None,
-        "license-url": None if licence.identifier in TABLES["licences"] else licence.address,
+        "license": publication.license if is_common else None,
+        "license-url": None if is_common else licence_address(publication.license),
         "commit": revision,
         "doi": publication.doi,
         "keywords": publication.keywords,
@@ -167,7 +135,7 @@ def zenodo_metadata(publication: Publication) -> dict[str, Any]:
         "version": publication.version,
         "creators": creators,
         "access_right": "open",
-        "license": find_licence(publication.license).identifier.lower(),
+        "license": publication.license.lower(),
         "language": "eng",
         "doi": publication.doi,
         "keywords": publication.keywords,

@@ -23,7 +23,7 @@ from icha.datasets.variables.campaign import (
     NOT_IN_DESIGN,
     STATUS_MEANINGS,
 )
-from icha.deposit.metadata import TABLES, acknowledgement, find_licence, paragraphs, web_address
+from icha.deposit.metadata import TABLES, acknowledgement, licence_address, paragraphs, web_address
 from icha.deposit.verify import COMPUTED
 from icha.planning.costs import Cost
 from icha.support import formatting
@@ -81,7 +81,7 @@ def readme(
         citation=f"{authors} ({publication.date[:4]}): {publication.title}. Version {publication.version}. Data set.",
         paper=MODEL_PAPER,
         summary=paragraphs(publication.summary),
-        licence=find_licence(publication.license),
+        licence_address=licence_address(publication.license),
         revision=revision,
         cost=cost,
         addresses={each.identifier: web_address(each.identifier) for each in publication.related_identifiers},

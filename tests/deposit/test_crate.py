@@ -54,7 +54,7 @@ def test_the_crate_states_files_origin_authors_and_licence(tmp_path):
     assert person["@id"] == f"https://orcid.org/{ORCID}" and person["name"] == "Josiah Carberry"
     assert person["affiliation"]["@id"] == team["@id"] == "https://ror.org/03yrm5c26"
     assert entities[other["affiliation"]["@id"]]["name"] == "Nowhere <Institute> & Sons"
-    assert entities[root["license"]["@id"]]["identifier"] == "CC0-1.0"
+    assert entities[root["license"]["@id"]]["name"] == "CC0-1.0"
     assert root["identifier"] == "https://doi.org/10.5281/zenodo.1234567"
     assert entities[root["citation"]["@id"]]["name"] == MODEL_PAPER.line
 

@@ -3,7 +3,6 @@
 
 from icha.configuration.cases import campaign_sha256
 from icha.configuration.design import sampled_parameters, varied_values
-from icha.deposit.metadata import discovery_attributes
 
 CONFIG_SHA256 = {case: STAMPS[path]["config_sha256"] for path, case in FILES.runs.items()}
 
@@ -37,8 +36,7 @@ rule analyse:
         number=len(FILES.runs),
         attributes=as_it_is(ATTRIBUTES),
         described=as_it_is(
-            discovery_attributes(PUBLICATION)
-            | {
+            {
                 "title": CAMPAIGN.title,
                 "summary": CAMPAIGN.summary,
                 "config_sha256": campaign_sha256(CAMPAIGN, CONFIG_SHA256.get),
