@@ -13,6 +13,7 @@ import numpy as np
 from icha.configuration.load import INPUTS
 from icha.datasets.results import RUN, SURFACE, THEORIES
 from icha.datasets.table import name_and_unit
+from icha.figures.drawn import COLUMNS
 
 _COLUMNS = "file group variable dimensions type units long_name flags missing comment files".split()
 # Placeholders for the parts of a path that differ between files of one kind.
@@ -50,7 +51,10 @@ def data_dictionary(folder: Path, files: Iterable[str]) -> str:
             with (folder / name).open(encoding="utf-8", newline="") as table:
                 for column in next(csv.reader(table), []):
                     variable, unit = name_and_unit(column)
-                    row = column, "row", "", unit, long_names.get(variable, variable), "", "empty", ""
+                    meaning = long_names.get(variable, variable)
+                    if name.startswith("figures/"):
+                        meaning, unit = COLUMNS.get(column, (column, ""))
+                    row = column, "row", "", unit, meaning, "", "empty", ""
                     found[file_pattern(name), "", *row] += 1
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows([_COLUMNS, *((*row, count) for row, count in found.items())])

@@ -58,6 +58,7 @@ def readme(
     """
     publication = campaign.deposit_metadata()
     tops = {path.split("/")[0] for path in sizes}
+    tables = [path for path in sizes if path.startswith("figures/") and path.endswith(".csv")]
     authors = "; ".join(author.sorted_name for author in publication.authors)
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent),
@@ -90,7 +91,7 @@ def readme(
         size=sum(sizes.values()),
         computed=sum(size for path, size in sizes.items() if path.split("/")[0] in COMPUTED),
         compared="aggregated/model_error.nc" in sizes,
-        figure_data=next((path for path in sorted(sizes) if re.fullmatch(r"figures/[^/]+\.csv", path)), ""),
+        figure_data=min(tables, key=lambda path: ("fig2_" not in path, path), default=""),
         **_outcome(publication, dataset, checks),
     )
     return text.rstrip() + "\n"

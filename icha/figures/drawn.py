@@ -1,16 +1,7 @@
 """Record what a figure draws, for the table `figures/NAME.csv` beside its picture.
 
-Functions that draw data also record it. The table has a row for each point, with these columns; columns without any
-value are left out:
-
-panel : letter of the panel.
-curve : what the point belongs to: a model, a theory, a kind of event.
-model, surface, seed, rms_slope, material : labels of the run; empty if the curve shows several runs.
-x, y : values in the units of the axes.
-low, high : ends of the error bar or band: of the 95 % interval for five or more seeds, otherwise of the range.
-seeds : number of seeds in the mean.
-radius : radius of a contact spot at x and y.
-x_quantity, y_quantity : labels of the axes, with their units.
+Functions that draw data also record it. The table has a row for each point, and the columns `COLUMNS`; columns without
+any value are left out.
 """
 
 from __future__ import annotations
@@ -28,7 +19,21 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-_COLUMNS = ("panel", "curve", *LABELS, "x", "y", "low", "high", "seeds", "radius", "x_quantity", "y_quantity")
+_RUN = "label of the run; empty if the curve shows several runs"
+# Meaning and unit of each column; "x" and "y" stand for the units in `x_quantity` and `y_quantity`.
+COLUMNS = {
+    "panel": ("letter of the panel", ""),
+    "curve": ("what the point belongs to: a model, a theory, a kind of event", ""),
+    **dict.fromkeys(LABELS, (_RUN, "")),
+    "x": ("value on the horizontal axis", "x"),
+    "y": ("value on the vertical axis", "y"),
+    "low": ("lower end of the error bar or band: of the 95 % interval for five or more seeds, else of the range", "y"),
+    "high": ("upper end of the error bar or band", "y"),
+    "seeds": ("number of seeds in the mean", "1"),
+    "radius": ("radius of a contact spot at x and y", "x"),
+    "x_quantity": ("label of the horizontal axis, with its unit", ""),
+    "y_quantity": ("label of the vertical axis, with its unit", ""),
+}
 
 
 class Name(NamedTuple):
@@ -64,9 +69,9 @@ def table_of(figure: Figure) -> pd.DataFrame:
         texts = {"panel": axes.get_title("left").strip("()")}
         texts |= {f"{direction}_quantity": plain(_label(axes, direction)) for direction in "xy"}
         frames.append(frame[finite].assign(**texts))
-    table = pd.concat([pd.DataFrame(columns=_COLUMNS[:1]), *(each for each in frames if len(each))])
-    shown = [column for column in _COLUMNS if column in table and not table[column].isin([None, "", np.nan]).all()]
-    return table[shown or list(_COLUMNS)] if frames else pd.DataFrame(columns=_COLUMNS)
+    table = pd.concat([pd.DataFrame(columns=["panel"]), *(each for each in frames if len(each))])
+    shown = [column for column in COLUMNS if column in table and not table[column].isin([None, "", np.nan]).all()]
+    return table[shown or list(COLUMNS)] if frames else pd.DataFrame(columns=list(COLUMNS))
 
 
 def _label(axes, direction):
