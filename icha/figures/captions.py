@@ -1,118 +1,96 @@
-"""Captions of the figures, and sentences that count missing runs and runs that are drawn pale."""
+"""Sentences that captions of several figures have, and sentences that count missing runs and pale runs."""
 
 from __future__ import annotations
 
-import re
-import tomllib
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from functools import cache
-from pathlib import Path
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from icha.contact.attraction import FINITE_RANGE, SHORT_RANGE
-from icha.contact.models import MODELS
-from icha.datasets.labels import LABELS, slopes_of
+from icha.datasets.labels import LABELS
 from icha.figures.select import has_shape, lacks_fit, lacks_sphere
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.figure import Figure
 
-
-@cache
-def _texts() -> dict[str, str]:
-    file = Path(__file__).with_name("captions.toml")
-    return {name: " ".join(text.split()) for name, text in tomllib.loads(file.read_text(encoding="utf-8")).items()}
-
-
-# A text of a caption that depends on what the figure shows, such as `[bare: Open shapes are …]`.
-_CONDITIONAL = re.compile(r"\[([^\]:]+): (.*?)\] ?")
-
-
-def caption_of(name: str, shown: str, grid: str = "") -> str:
-    """Return the caption of a figure.
-
-    Parameters
-    ----------
-    name : name of the figure.
-    shown : lines that tell what the figure shows, from `texts_of`.
-    grid : sentence on the error of loops due to the grid, from `sentence_on_loops`; only captions of loops contain it.
-    """
-
-    def choose(found):
-        return f"{found[2]} " if re.search(found[1], shown, re.MULTILINE) else ""
-
-    return _CONDITIONAL.sub(
-        choose, f"{_texts()[name]} {{units_of_shapes}}".format_map(_texts() | {"grid_of_loops": grid})
-    ).strip()
+_RANGES = {
+    (SHORT_RANGE,): "Boundary elements are in the limit of a short range of attraction.",
+    (FINITE_RANGE,): """Boundary elements with adhesion have the range of attraction of the material, which the grid
+    resolves. Their contact area is the area of zero gap.""",
+    (SHORT_RANGE, FINITE_RANGE): """Boundary elements at a finite range have the range of attraction of the material
+    where the grid resolves it; their contact area is the area of zero gap. Other boundary elements with adhesion are
+    in the limit of a short range.""",
+}
 
 
-def texts_of(figure: Figure, data: Mapping[str, object], studies: Sequence[str]) -> str:
-    """Return all texts of a figure, and words for what no text of a figure tells, as lines.
-
-    Words are the names of the `data`, and words for the `studies` that are shown: materials that are `bare`, `adhesive`
-    or `with and without adhesion`; `several surfaces`, `several slopes`, `bare at several slopes`, `adhesive at several
-    slopes`, `one seed`, `periodic` surfaces, `units of a shape`, `first surface with a shape`, runs `without a sphere`
-    or `without a fit` of JKR; boundary elements `in the limit`, `at finite range` or of `both ranges`. Texts name `both
-    models`, or `only` one model.
-    """
-    from matplotlib.text import Text
-
-    words = [*data, *(text.get_text() for text in figure.findobj(Text))]
-    has_units = any(r"\mathrm{rms}" in word for word in words)
-    models = [model.words for model in MODELS.values() if any(word.startswith(model.words) for word in words)]
-    words += ["both models"] if len(models) > 1 else [f"only {model}" for model in models]
-    campaign = data["campaign"].children if "campaign" in data else {}
-    attractions: set[str] = set()
-    for study in (campaign[name].to_dataset() for name in studies if name in campaign):
-        bare, adhesive = (study["surface_energy"] == 0).any(), (study["surface_energy"] > 0).any()
-        several_slopes = len(slopes_of(study)) > 1
-        conditions = {
-            "bare": bare,
-            "adhesive": adhesive,
-            "with and without adhesion": bare and adhesive,
-            "several surfaces": study.sizes["surface"] > 1,
-            "several slopes": several_slopes,
-            "bare at several slopes": bare and several_slopes,
-            "adhesive at several slopes": adhesive and several_slopes,
-            "one seed": study.sizes["seed"] == 1,
-            "units of a shape": has_units and has_shape(study),
-            "periodic": (study["boundary"] == "periodic").any(),
-            "first surface with a shape": has_shape(study.isel(surface=0)),
-            "without a sphere": lacks_sphere(study),
-            "without a fit": lacks_fit(study),
-        }
-        words += [word for word, holds in conditions.items() if holds]
-        attractions.update(study["attraction"].values.ravel() if "attraction" in study else ())
-    ranges = {"in the limit": SHORT_RANGE, "at finite range": FINITE_RANGE}
-    present = [word for word, attraction in ranges.items() if attraction in attractions]
-    return "\n".join(words + (["both ranges"] if len(present) > 1 else present))
+def range_of_attraction(attractions: Iterable[str]) -> str:
+    """Return a sentence on the range of attraction of boundary elements; "" if there are none."""
+    found = set(attractions)
+    return _RANGES.get(tuple(each for each in (SHORT_RANGE, FINITE_RANGE) if each in found), "")
 
 
-def sentence_on_measurements(measurements: Sequence[Mapping[str, object]]) -> str:
-    """Return a sentence with label and citation of each measurement in a figure; "" without measurements."""
-    named = "; ".join(f"{each['label']} ({each['citation']})" for each in measurements)
-    return f"Lines without markers are measurements: {named}." if named else ""
+def attractions_of(runs: Iterable[xr.Dataset]) -> set[str]:
+    """Return the laws of attraction of runs; runs of the asperity model have none."""
+    return {run.attrs.get("attraction", "") for run in runs}
 
 
-def sentence_on_loops(data: Mapping[str, object], studies: Sequence[str]) -> str:
+def only_model(names: Sequence[str]) -> str:
+    """Return which model all symbols are, if the legend names only one."""
+    one = {"asperities": "the asperity model"}.get(names[0], names[0])
+    return f"All symbols are {one}." if len(names) == 1 else ""
+
+
+def units_of_shapes(figure: Figure, studies: Sequence[xr.Dataset]) -> str:
+    """Return a sentence on the reduced units of surfaces with a shape, if the labels of the figure have these units."""
+    labels = [text for axes in figure.axes for text in (axes.get_xlabel(), axes.get_ylabel(), axes.get_title("right"))]
+    if not any(r"\mathrm{rms}" in label for label in labels) or not any(map(has_shape, studies)):
+        return ""
+    return """On a surface with a shape, the units h_rms of gaps and h'rms of loads are not those of the roughness, but
+    the rms height of the shape, and this height divided by the side of the square."""
+
+
+def theories_of_flat_surfaces(study: xr.Dataset) -> str:
+    """Return why no theory is drawn, if the first surface of a study has a shape."""
+    if not has_shape(study.isel(surface=0)):
+        return ""
+    return """Theories of rough contact are for nominally flat surfaces. They do not hold under a shape, so none is
+    drawn."""
+
+
+def without_fit(study: xr.Dataset) -> str:
+    """Return why fits of JKR are missing, if some are."""
+    if not lacks_fit(study):
+        return ""
+    return """Where a fit is missing, the Tabor parameter of the sphere is below 3, the value from which JKR holds; or
+    there are fewer than three states; or the contact is so small that Hertz's law without adhesion fits better."""
+
+
+def only_spheres(study: xr.Dataset) -> str:
+    """Return which runs a figure of spheres with adhesion leaves out, if any."""
+    left_out = ["Runs on shapes without a radius, and runs on layers, are left out."] if lacks_sphere(study) else []
+    left_out += ["Runs without adhesion are left out."] if (study["surface_energy"] == 0).any() else []
+    return " ".join(left_out)
+
+
+def grid_of_loops(campaign: xr.DataTree, studies: Sequence[str]) -> str:
     """Return a sentence on the error of loops by boundary elements due to the grid; "" without such loops."""
     from icha.analysis.grid_error import cells_of_loops, describe_loops
 
-    loops = cells_of_loops(data["campaign"], studies) if "campaign" in data else {}
+    loops = cells_of_loops(campaign, studies)
     return f"Grid: {describe_loops(loops)}." if loops else ""
 
 
-def count_runs(data: Mapping[str, object], studies: Sequence[str], shown: str = "") -> str:
+def count_runs(data: Mapping[str, object], studies: Sequence[str], *, of_loss: bool = False) -> str:
     """Count the runs that a figure leaves out or draws pale, in sentences for the end of its caption; often empty.
 
     Parameters
     ----------
     data : datasets of the figure, by name.
     studies : names of the studies whose runs the figure shows.
-    shown : lines that tell what the figure shows, from `texts_of`.
+    of_loss : True if the figure shows losses, which runs that failed checks of their loss do not have.
     """
     from icha.analysis.left_out import absent_materials, left_out_of_study
     from icha.analysis.sensitivity import left_out_of_samples
@@ -125,7 +103,7 @@ def count_runs(data: Mapping[str, object], studies: Sequence[str], shown: str = 
         if name not in getattr(data.get("campaign"), "children", ()):
             continue
         study, suffix = data["campaign"][name].to_dataset(), f" in study {name}" if len(studies) > 1 else ""
-        left_out = left_out_of_study(study, of_loss="loss" in shown)
+        left_out = left_out_of_study(study, of_loss=of_loss)
         if left_out.words:
             biased = "; the others are a biased selection" if left_out.biased else ""
             found.append(

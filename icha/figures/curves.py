@@ -11,7 +11,8 @@ from icha.contact.models import MODELS, REFERENCE_MODEL
 from icha.datasets.labels import slopes_of
 from icha.datasets.quantities import label_of
 from icha.figures import select
-from icha.figures.drawn import plot, record
+from icha.figures.captions import attractions_of, range_of_attraction
+from icha.figures.drawn import plot, record, say
 from icha.figures.ensembles import draw_members, lines_handles, mark_fewer
 from icha.figures.looks import (
     ASPERITIES_NAME,
@@ -39,9 +40,13 @@ if TYPE_CHECKING:
 _UNLOADING = {"ls": BRANCH_DASHES["unloading"], "lw": 0.7, "zorder": 2.2}
 
 
-def gap_label(data: xr.Dataset) -> str:
-    """Return the axis label "mean gap", or the label "mean separation" if all surfaces are periodic."""
-    return label_of("reduced_gap" if (data["boundary"] == "free").any() else "reduced_separation")
+def gap_name(data: xr.Dataset) -> str:
+    """Return the name of the mean gap, or of the mean separation if all surfaces are periodic."""
+    return "reduced_gap" if (data["boundary"] == "free").any() else "reduced_separation"
+
+
+# Type of a function that returns the loads and the values of all steps of a run.
+Points = Callable[["xr.Dataset"], tuple[np.ndarray, np.ndarray]]
 
 
 class Curve(NamedTuple):
@@ -76,17 +81,30 @@ class Curves(NamedTuple):
     handles: dict[str, Line2D]
 
 
-def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | None = None, **changed: object) -> Curves:
+def study_curves(
+    campaign: xr.DataTree,
+    study: str,
+    boundary_elements: str | None = None,
+    *,
+    points: Points | None = None,
+    **changed: object,
+) -> Curves:
     """Return the curves of a study, with boundary elements of the same study or of the study `boundary_elements`.
 
-    `changed` are arguments of `Axes.plot` that replace the usual arguments of all markers.
+    Curves without `points` are left out, if this function is given. `changed` are arguments of `Axes.plot` that replace
+    the usual arguments of all markers.
     """
+
+    def has_points(group):
+        return points is None or any(len(points(select.path_steps(run))[0]) for run in group.by_seed.values())
+
     groups = select.group_by_contact(campaign, select.select_runs(campaign, study, ragged=False))
+    groups = list(filter(has_points, groups)) or groups
     dataset = campaign[study].to_dataset()
     name, lines = model_name(dataset), []
     other = boundary_elements or (study if name == ASPERITIES_NAME else None)
     truths = select.select_runs(campaign, other, ragged=False, model=REFERENCE_MODEL) if other else []
-    grouped = select.group_by_contact(campaign, truths)
+    grouped = list(filter(has_points, select.group_by_contact(campaign, truths)))
     materials = dataset["material"].values.tolist()
     contacts = sorted((group.contact for group in groups), key=lambda contact: materials.index(contact[0]))
     looks = Looks(campaign, dataset, contacts, crosses=bool(grouped) or name != ASPERITIES_NAME)
@@ -146,6 +164,21 @@ def snapshot_looks(campaign: xr.DataTree, study: str, lines: Sequence[select.Sna
     return [looks.look(group.contact, applicable=group.applicable) | shape for group in groups], looks
 
 
+def say_snapshot_models(figure: Figure, lines: Sequence[select.Snapshots], beside: str) -> None:
+    """Explain the lines of the models in a figure of one snapshot; `beside` names the lines beside asperities."""
+    model = lines[0].runs.model_name
+    if model == ASPERITIES_NAME:
+        bare = not all(line.runs.surface_energy for line in lines)
+        say(figure, "Solid lines with circles are results of the asperity model.")
+        say(figure, "Open circles are results without adhesion." if bare else "")
+    else:
+        say(figure, "Solid lines with crosses are results of boundary elements.")
+    if any(line.truths for line in lines):
+        say(figure, f"{beside} are boundary elements, on the same topographies.")
+    runs = (run for line in lines for run, _ in (*line.members, *line.truths))
+    say(figure, range_of_attraction(attractions_of(runs)))
+
+
 def add_snapshot_legend(
     figure: Figure, panels: Sequence[Axes], dataset: xr.Dataset, lines: Sequence[select.Snapshots], looks: Looks
 ) -> None:
@@ -160,12 +193,8 @@ def add_snapshot_legend(
     handles |= {model: model_handle(model, ls="-", lw=0.8, **looks.fill())}
     if any(line.truths for line in lines):
         handles[REFERENCE_NAME] = model_handle(REFERENCE_NAME, **TRUTH_LINE)
-    handles |= lines_handles(len(line.members) for line in lines) | named_handles(panels[1:])
+    handles |= lines_handles(figure, [len(line.members) for line in lines]) | named_handles(panels[1:])
     legend_below(figure, handles)
-
-
-# Type of a function that returns the loads and the values of all steps of a run.
-Points = Callable[["xr.Dataset"], tuple[np.ndarray, np.ndarray]]
 
 
 def area_points(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
@@ -296,11 +325,30 @@ def _draw_unloading(panels, line):
             pressed = np.where(load > 0, load, np.nan)
             axes.add_artist(legend_handle(pressed, values, color=line.look["mec"], **_UNLOADING))
             axes.plot([], [], color=GREY, label="unloading", **_UNLOADING)
+            say(axes, "Thin dashed lines show unloading at compressive loads, for every seed.")
+
+
+def say_models(figure: Figure, curves: Curves, where: str = "", *, stars: str = "Crosses and stars") -> None:
+    """Explain the symbols of the models in the caption, such as circles of the asperity model `where` in loading."""
+    groups = [curve.runs for curve in (*curves.lines, *curves.crosses)]
+    models = dict.fromkeys(group.model_name for group in groups)
+    several = {model: any(name.startswith(f"{model}, ") for name in curves.handles) for model in models}
+    if ASPERITIES_NAME in models:
+        shapes = "Circles and other shapes" if several[ASPERITIES_NAME] else "Circles"
+        say(figure, f"{shapes} are the asperity model{where}.")
+    if REFERENCE_NAME in models:
+        shapes = stars if several[REFERENCE_NAME] else "Crosses"
+        beside = ", on the same topographies" if curves.crosses else ""
+        say(figure, f"{shapes} are boundary elements{where}{beside}.")
+    if select.FINITE_RANGE_NAME in models:
+        say(figure, f"Crosses with three arms are boundary elements at a finite range{where}.")
+    runs = (run for group in groups for run in group.by_seed.values())
+    say(figure, range_of_attraction(attractions_of(runs)))
 
 
 def add_legend(figure: Figure, panels: Sequence[Axes], curves: Curves) -> None:
     """Add a legend of the curves, and of everything that has a label in the panels."""
-    seeds = lines_handles(len(line.runs.by_seed) for line in curves.lines)
+    seeds = lines_handles(figure, [len(line.runs.by_seed) for line in curves.lines])
     handles = curves.handles | seeds | named_handles(panels)
     legend_below(figure, handles, rows=curves.looks.slopes_per_surface)
 

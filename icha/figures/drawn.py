@@ -1,7 +1,7 @@
-"""Record what a figure draws, for the table `figures/NAME.csv` beside its picture.
+"""Record what a figure draws: sentences for its caption, and data for the table `figures/NAME.csv`.
 
-Functions that draw data also record it. The table has a row for each point, and the columns `COLUMNS`; columns without
-any value are left out.
+Functions that draw something also say so in the caption, and record its data. The table has a row for each point, and
+the columns `COLUMNS`; columns without any value are left out.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from icha.datasets.quantities import plain
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
@@ -41,6 +42,17 @@ class Name(NamedTuple):
 
     curve: str
     labels: RunLabels | None = None
+
+
+def say(owner: Artist, *sentences: str) -> None:
+    """Append sentences to the caption of a figure, or of the figure of a panel; the caption has each sentence once."""
+    said = owner.figure.__dict__.setdefault("sentences", {})
+    said.update({" ".join(sentence.split()): True for sentence in sentences if sentence})
+
+
+def caption_of(figure: Figure) -> str:
+    """Return the sentences of a figure."""
+    return " ".join(getattr(figure, "sentences", ()))
 
 
 def plot(axes: Axes, x: Any, y: Any, name: Name | str = "", **look: Any) -> Line2D:

@@ -10,7 +10,7 @@ import numpy as np
 
 from icha.analysis.left_out import too_few
 from icha.datasets.labels import RunLabels
-from icha.figures.drawn import Name, record
+from icha.figures.drawn import Name, record, say
 from icha.figures.looks import FEWER_SEEDS
 from icha.figures.select import ContactRuns
 from icha.figures.style import GREY, legend_handle
@@ -19,6 +19,7 @@ from icha.support.statistics import ENOUGH, ensemble
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.container import ErrorbarContainer
+    from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
 # Largest number of curves whose single seeds are drawn; with more curves, only the means could be told apart.
@@ -242,26 +243,42 @@ class Points:
         return draw_points(axes, x, y, look, positive=True, name=self.name, asked=self.asked, shift=shift)
 
 
-def lines_handles(counts: Iterable[int]) -> dict[str, Line2D]:
-    """Return the legend entries of lines that are means over `counts` seeds."""
+def lines_handles(figure: Figure, counts: Iterable[int]) -> dict[str, Line2D]:
+    """Return the legend entries of lines that are means over `counts` seeds, and explain the lines in the caption."""
     counts = list(counts)
+    if any(count > 1 for count in counts):
+        say(figure, _MEANS)
     if len(counts) > MOST_SCATTERED and max(counts) < ENOUGH:
-        return _handles(counts, {"": {}, "means over the seeds": {"ls": "none"}})
-    band = {"alpha": 0.35, "lw": 6, "solid_capstyle": "butt"}
-    return _handles(counts, {"mean and 95 % band": band, "single seeds beside their mean": _SEED_LINE})
+        return _handles(figure, counts, {"": ({}, ""), "means over the seeds": ({"ls": "none"}, "")})
+    band = {"alpha": 0.35, "lw": 6, "solid_capstyle": "butt"}, _BAND
+    return _handles(
+        figure, counts, {"mean and 95 % band": band, "single seeds beside their mean": (_SEED_LINE, _SINGLE)}
+    )
 
 
-def points_handles(counts: Iterable[int]) -> dict[str, Line2D]:
-    """Return the legend entries of points that are means over `counts` seeds."""
-    bars = {"marker": "|", "ls": "none", "ms": 8}
-    return _handles(counts, {"mean and 95 % interval": bars, "mean and range": bars})
+def points_handles(figure: Figure, counts: Iterable[int]) -> dict[str, Line2D]:
+    """Return the legend entries of points that are means over `counts` seeds, and explain the bars in the caption."""
+    counts, bars = list(counts), {"marker": "|", "ls": "none", "ms": 8}
+    if any(count > 1 for count in counts):
+        say(figure, "Points are means over the seeds (realisations of the surface).")
+    return _handles(figure, counts, {"mean and 95 % interval": (bars, _BARS), "mean and range": (bars, _RANGE)})
 
 
-def _handles(counts, looks):
-    """Return legend entries; the first of `looks` is for means over many seeds, the second for means over few seeds."""
+_MEANS = """Lines and symbols are means over the seeds (realisations of the surface) at common loads, interpolated
+between the computed states of each seed."""
+_BAND = """A band shows the 95 % confidence interval of the mean (Student's t), on a logarithmic axis of the
+logarithm."""
+_SINGLE = "Pale thin lines show the single seeds; crosses are only means."
+_BARS = "Bars are 95 % confidence intervals of the mean (Student's t), for positive quantities of the logarithm."
+_RANGE = "Bars are the range of the single seeds."
+
+
+def _handles(figure, counts, looks):
+    """Return legend entries; the first look and sentence are for means over many seeds, the second for few seeds."""
     sizes, found = {int(count) for count in counts if count > 1}, {}
-    for enough, (words, look) in zip((True, False), looks.items(), strict=True):
+    for enough, (words, (look, sentence)) in zip((True, False), looks.items(), strict=True):
         if group := {size for size in sizes if (size >= ENOUGH) == enough}:
+            say(figure, sentence)
             span = "–".join(map(str, sorted({min(group), max(group)})))
             found[f"{words}, n = {span}"] = legend_handle(color=GREY, **look)
     return found

@@ -10,7 +10,8 @@ import numpy as np
 
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of
-from icha.figures.drawn import Name
+from icha.figures.captions import range_of_attraction
+from icha.figures.drawn import Name, say
 from icha.figures.ensembles import draw_points, points_handles
 from icha.figures.looks import Contact, Looks, legend_below
 from icha.figures.select import NothingToDraw, compared_seeds, select_errors
@@ -31,7 +32,7 @@ _MARGIN, _LEAST_REACH = 1.2, 1.6
 
 @in_style
 def draw_errors(
-    campaign: xr.DataTree, model_error: xr.DataTree, *, study: str, names: Sequence[str], percent: bool
+    campaign: xr.DataTree, model_error: xr.DataTree, *, study: str, names: Sequence[str], percent: bool, words: str
 ) -> Figure:
     """Draw variables of the model error against load, with one panel for each variable.
 
@@ -41,6 +42,7 @@ def draw_errors(
     model_error : the errors of the campaign, from `icha.analysis.model_error.model_error`.
     study : name of the study; the figure shows all errors of this study.
     names : the variables, one for each column of panels.
+    words : first sentences of the caption.
     percent : True for relative errors, which are drawn in per cent; False for variables that are never negative.
     """
     curves = _curves(model_error, study, names)
@@ -50,6 +52,7 @@ def draw_errors(
     looks = Looks(campaign, interfaces, contacts, by_place=own_rows)
     rows = [[material] for material in looks.materials] if own_rows else [looks.materials]
     fig, panels = new_panels(0.55 + 2.35 * len(rows), len(rows), len(names), sharex=True, sharey="col")
+    say(fig, words)
     named: dict[str, object] = {}
     counts: set[int] = set()
     for row, shown in zip(panels, rows, strict=True):
@@ -80,7 +83,13 @@ def draw_errors(
         ax.set(xlabel=label_of("reduced_pressure"), ylim=(None if percent else 0, None))
     named.pop("", None)
     named = looks.colour_handles() if own_rows else looks.handles() if looks.many else named
-    legend_below(fig, named | points_handles(counts), rows=looks.slopes_per_surface)
+    legend_below(fig, named | points_handles(fig, counts), rows=looks.slopes_per_surface)
+    errors = model_error[study]
+    say(fig, range_of_attraction(errors["attraction"].values.ravel() if "attraction" in errors else ()))
+    if not all(looks.adhesive(material) for material in looks.materials):
+        coinciding = "; slopes whose results coincide without adhesion are drawn once" if own_rows else ""
+        say(fig, f"Open markers are without adhesion{coinciding}.")
+    say(fig, "Points at one load are drawn apart.")
     return fig
 
 

@@ -11,11 +11,13 @@ from icha.contact.models import MODELS, REFERENCE_MODEL
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of
 from icha.figures import select
+from icha.figures.captions import attractions_of, grid_of_loops, range_of_attraction
 from icha.figures.curves import Axis, physical_units
-from icha.figures.drawn import Name, plot, record
+from icha.figures.drawn import Name, plot, record, say
 from icha.figures.looks import (
     BRANCH_DASHES,
     MODEL_MARKERS,
+    REFERENCE_NAME,
     UNLOADING_MARKERS,
     legend_below,
     looks_of_studies,
@@ -44,6 +46,11 @@ _POINTS_BETWEEN = 8
 _PULL_OFF = {"ls": "none", "mec": "black", "mew": 0.7, "ms": 4.6, "zorder": 6}
 _TRUTH = {"ls": "none", "ms": 3.6, "mew": 0.7, "zorder": 5}
 _TRUTH_MARKERS = {"loading": MODEL_MARKERS, "unloading": UNLOADING_MARKERS}
+_TRUTH_WORDS = {
+    REFERENCE_NAME: """Crosses are boundary elements on the same topography, upright in loading and oblique in
+    unloading.""",
+    select.FINITE_RANGE_NAME: "Crosses with three arms are boundary elements at a finite range of attraction.",
+}
 # Variables along x and y of the two panels; `separation` and `load` are in the units of the figure.
 _LOADS = ("separation", "load")
 _AREAS = ("load", "contact_area_fraction")
@@ -116,6 +123,21 @@ def figure(
     windows = [_small_tensions(loops_of_row) for loops_of_row in by_row]
     columns = 3 if any(windows) else 2
     fig, panels = new_panels(2.7 * len(rows), len(rows), columns)
+    physical = units == "physical"
+    load = "nominal pressure" if physical else "reduced pressure"
+    against = "mean separation" if physical else "mean separation divided by the rms height"
+    unit = "" if physical else ", multiplied by E* h'rms hrms,"
+    say(
+        fig,
+        f"""Loading (wide lines) and unloading (dashed lines) on one topography, which the title names: the
+        {load}{"" if physical else " F/(E* h'rms A0)"} against the {against} (left), and the contact area divided by the
+        nominal area against the {load} (right).""",
+        "The middle panel enlarges the region around zero load of the left panel." if columns > 2 else "",
+        """Where both lines coincide, contact is reversible. Tension is negative. Sudden changes along a line are jumps
+        of one or several spots. A straight line joins the states before and after a jump, as at both ends of a path,
+        where the load is zero because there is no contact.""",
+        f"The area between loading and unloading on the left{unit} is the energy lost per nominal area.",
+    )
     for (left, *middle, right), shown_loops, window in zip(panels, by_row, windows, strict=True):
         for loop in shown_loops:
             for ax, names in ((left, _LOADS), *((ax, _LOADS) for ax in middle), (right, _AREAS)):
@@ -142,6 +164,9 @@ def figure(
     title = " and ".join(MODELS[model].words for model in models)
     words = title, surface_label(campaign, labels.surface), f"seed {labels.seed}"
     fig.suptitle(", ".join(words), fontsize="medium")
+    shown = [run for loop in drawn for run in (loop.run, *loop.truths)]
+    studies = list(dict.fromkeys(filter(None, (study, boundary_elements))))
+    say(fig, range_of_attraction(attractions_of(shown)), grid_of_loops(campaign, studies))
     legend_below(fig, _handles(looks, drawn, marked=len(rows[0]) > 1), looks.heading())
     return fig
 
@@ -163,11 +188,15 @@ def _draw(ax, loop, names, *, turn):
         record(ax, *(leg[name].values for name in names), Name(f"{words}, {branch}", loop.labels))
         ax.plot(*line, ls=BRANCH_DASHES[branch], color=colour, **_BRANCHES[branch])
     marked = [(np.flatnonzero(run["leg"] == 0)[-1], {"ls": "none", "zorder": 5})] if turn else []
+    if turn:
+        say(ax, "Symbols without an edge mark the end of the first loading.")
     if (at := select.pull_off_step(run)) is not None:
+        say(ax, "Symbols with a black edge mark pull-off, the largest tension in the last unloading.")
         marked.append((at, _PULL_OFF))
     for step, look in marked:
         ax.plot(*(run[name].values[step] for name in names), **loop.look | look)
     for truth in loop.truths:
+        say(ax, _TRUTH_WORDS[select.name_of_model(truth)])
         for branch, markers in _TRUTH_MARKERS.items():
             states = truth.isel(step=truth["branch"].values == branch)
             look = {"color": colour, "marker": markers[select.name_of_model(truth)], **_TRUTH}

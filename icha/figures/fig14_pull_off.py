@@ -10,7 +10,9 @@ import numpy as np
 
 from icha.contact.models import REFERENCE_MODEL
 from icha.datasets.quantities import label_of
+from icha.figures.captions import attractions_of, grid_of_loops, only_model, range_of_attraction
 from icha.figures.curves import cross_look, drop_rounding_errors
+from icha.figures.drawn import say
 from icha.figures.ensembles import Points, points_handles
 from icha.figures.looks import (
     ASPERITIES_NAME,
@@ -61,6 +63,12 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
     factor, unit = choose_unit(max(float(run[_Y]) for point in points for run in point.by_seed.values()), "Pa")
 
     fig, [panels] = new_panels(2.9, columns=2 if by_load else 1, width=TWO_COLUMNS if by_load else ONE_COLUMN)
+    second = " (a) and against the largest reduced pressure F/(E* h'rms A0) of the path (b)" if by_load else ""
+    say(
+        fig,
+        f"""Pull-off pressure against the rms slope{second} of runs that separated completely. The pull-off pressure is
+        the largest nominal tension in unloading.""",
+    )
     counts = []
     for ax, x, drawn in zip(panels, ("rms_slope", "largest_reduced_pressure"), (by_slope, by_load), strict=False):
         lines = {key: Points(line, x, _Y, factor=factor) for key, line in drawn.items()}
@@ -96,9 +104,26 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
             look = {"marker": cross_look(looks, contact, shape=_OBLIQUE)["marker"]}
             words = [REFERENCE_NAME, *([looks.shape_name(contact)] if any(map(looks.rank, crossed)) else [])]
             handles[", ".join(words)] = model_handle(REFERENCE_NAME, **look | _TRUTH)
+        crosses = "Crosses and stars" if any(map(looks.rank, crossed)) else "Crosses"
+        say(
+            fig,
+            f"""{crosses} with dashed lines are boundary elements, other symbols are the asperity model, on the same
+            topographies.""",
+        )
+    runs = (run for point in points for run in point.by_seed.values())
+    or_load = " or load" if by_load else ""
+    say(
+        fig,
+        only_model(models),
+        range_of_attraction(attractions_of(runs)),
+        f"Points of several lines at one slope{or_load} are drawn side by side; lines guide the eye.",
+    )
+    if not all(point.surface_energy for point in points):
+        say(fig, "Without adhesion (open markers), it is zero; a logarithmic axis is linear near zero.")
+    say(fig, grid_of_loops(campaign, list(dict.fromkeys([study, *load_studies]))))
     title = [models[0] if len(models) == 1 else None, looks.heading()]
     panels[0].set_title(", ".join(filter(None, title)), loc="right", fontsize=8)
-    legend_below(fig, handles | points_handles(counts))
+    legend_below(fig, handles | points_handles(fig, counts))
     return fig
 
 

@@ -11,8 +11,9 @@ import numpy as np
 from icha.contact.models import REFERENCE_MODEL
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import LOSS_PARTS, label_of
+from icha.figures.captions import attractions_of, grid_of_loops, only_model, range_of_attraction
 from icha.figures.curves import cross_look
-from icha.figures.drawn import Name, plot, record
+from icha.figures.drawn import Name, plot, record, say
 from icha.figures.ensembles import Points, points_handles
 from icha.figures.looks import ASPERITIES_NAME, REFERENCE_NAME, legend_below, looks_of_studies, model_handle, pale
 from icha.figures.select import ContactRuns, NothingToDraw, names_of_models, select_detached_lines
@@ -49,6 +50,11 @@ _LOSS = ("largest_contact_area_fraction", "hysteresis_loss_over_surface_energy")
 # Opacity of the bars of runs to which the model is not applicable.
 _PALE = 0.35
 
+_FIT = """Lines are least-squares fits of a straight line to points that differ only in their largest load. The legend
+gives the coefficient of determination r² and the exponent of a power law through the same points; the exponent is 1 if
+the loss is proportional to the contact area. Violano and Afferrante (Lubricants 9 (2021) 7) found a linear growth of
+the loss."""
+
 
 @in_style
 def figure(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
@@ -66,6 +72,18 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
     sticky = {key: line for key, line in sticky.items() if key not in truths}
 
     fig, [(loss, parts)] = new_panels(3.1, width_ratios=(1.25, 1))
+    models = names_of_models(itertools.chain(*sticky.values(), *truths.values()))
+    say(
+        fig,
+        """Hysteresis loss of runs with adhesion, divided by the surface energy, against the largest contact area on the
+        path divided by the nominal area (a). The loss is the energy per nominal area that is dissipated on a path from
+        first contact to the largest load and back to complete separation.""",
+        "Crosses are boundary elements, other symbols the asperity model." if truths else only_model(models),
+    )
+    if models != [ASPERITIES_NAME]:
+        say(fig, "With boundary elements, the loss is known to 0.1 % of the largest work done in loading.")
+    every = (run for line in (*sticky.values(), *truths.values()) for group in line for run in group.by_seed.values())
+    say(fig, range_of_attraction(attractions_of(every)))
     handles, counts = _draw_losses(loss, sticky, truths, looks)
     if truths:
         names = {ASPERITIES_NAME: looks.fill(), REFERENCE_NAME: {}}
@@ -73,8 +91,18 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
     else:
         loss.set_title(", ".join(names_of_models(itertools.chain(*sticky.values()))), loc="right")
     shown = _draw_parts(parts, sticky, looks)
+    say(
+        fig,
+        """Panel (b) shows the causes of the loss at the largest load of every series of panel (a), with the marker of
+        the series below the bar.""",
+        "The causes are those of the asperity model." if truths else "",
+        """Negative parts are energy gained when spots unite or separate. Each part is divided by the sum of the
+        magnitudes of all parts.""",
+        "The unattributed loss has none of these causes." if "loss_unattributed" in shown else "",
+        grid_of_loops(campaign, studies),
+    )
     handles |= {label_of(name): Patch(ec="black", lw=0.5, **PARTS[name]) for name in shown}
-    legend_below(fig, handles | points_handles(counts), looks.heading(), rows=looks.slopes_per_surface)
+    legend_below(fig, handles | points_handles(fig, counts), looks.heading(), rows=looks.slopes_per_surface)
     return fig
 
 
@@ -95,6 +123,7 @@ def _draw_losses(ax, runs, truths, looks):
         if line.same_seeds and len(np.unique(x)) >= _LEAST_POINTS:
             along = np.linspace(x.min(), x.max(), _FIT_POINTS)
             values, r_squared, exponent = fit_line(x, y, along)
+            say(ax, _FIT)
             words = f": $r^2$ = {r_squared:.4f}, exponent {exponent:.2f}"
             plot(
                 ax,

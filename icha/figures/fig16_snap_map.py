@@ -11,7 +11,8 @@ from icha.contact.model import EVENT_KINDS
 from icha.contact.models import REFERENCE_MODEL
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of
-from icha.figures.drawn import plot
+from icha.figures.captions import grid_of_loops
+from icha.figures.drawn import plot, say
 from icha.figures.looks import BRANCH_DASHES, COARSE_GRID_ALONE, NOT_APPLICABLE_ALONE, legend_below
 from icha.figures.maps import topography_of
 from icha.figures.select import is_good_loop, select_complete_run, unloading_legs
@@ -52,6 +53,19 @@ def figure(campaign: xr.DataTree, surface: xr.Dataset, *, run: Sequence) -> Figu
     data = select_complete_run(campaign, labels)
     events = _events(data)
     fig, [(where, when)] = new_panels(3.1, width_ratios=(1.3, 1))
+    unions = "coalescence" in events["kind"]
+    say(
+        fig,
+        """Events of one run. Panel (a) shows where spots formed in the first loading and broke in the last unloading,
+        on a map of the topography with the highest parts white.""",
+        "A spot forms by a jump into contact and breaks by a jump off." if float(data["surface_energy"]) else "",
+        "Marks of unions are at the centre of the united spot." if unions else "",
+        """The legend gives the number of marks of each kind. Panel (b) shows the number of events since the beginning
+        of loading (solid lines) or unloading (dashed lines) against the mean separation, in the colours of panel
+        (a).""",
+        "Thin lines count unions." if unions else "",
+        grid_of_loops(campaign, [labels.study]),
+    )
     handles = _draw_places(where, topography_of(data, surface), events)
     _draw_counts(when, events)
     title = f"{material_label(campaign[labels.study].to_dataset(), labels.material)}, {slope_label(labels.rms_slope)}"

@@ -8,9 +8,10 @@ import numpy as np
 
 from icha.datasets.quantities import label_of
 from icha.figures import select
-from icha.figures.drawn import Name, plot
+from icha.figures.drawn import Name, plot, say
 from icha.figures.indenter_curves import select_series, theory_curves
 from icha.figures.looks import BRANCH_DASHES, legend_below
+from icha.figures.select import lacks_sphere
 from icha.figures.style import BLACK, GREY, in_style, legend_handle, new_panels
 from icha.support.formatting import choose_unit
 
@@ -23,6 +24,13 @@ if TYPE_CHECKING:
 _MOST_SERIES = 3
 _LOOP = {"lw": 0.9, "alpha": 0.85}
 _THEORIES = {"JKR": {"color": GREY, "lw": 2.4, "alpha": 0.45}, "Hertz": {"color": GREY, "lw": 0.9, "ls": ":"}}
+_THEORY_WORDS = {
+    "Hertz": """The dotted line is the theory of Hertz for a smooth sphere with the radius and the modulus of the runs
+    in the same panel.""",
+    "JKR": """The wide grey line is the theory of Johnson, Kendall and Roberts (JKR) for this sphere with the work of
+    adhesion of these runs, with the states that are unstable under load control, from the pull-off force to the
+    jump-off under displacement control.""",
+}
 # Space around the states of the runs, divided by their range.
 _MARGIN = 0.06
 
@@ -44,6 +52,15 @@ def figure(campaign: xr.DataTree, *, study: str) -> Figure:
     columns = min(len(shown), 2)
     rows = -(-len(shown) // columns)
     fig, panels = new_panels(2.7 * rows, rows, columns, width=3.55 * max(columns, 1.3), sharex=True, sharey=True)
+    say(
+        fig,
+        """Force against indentation in loading (solid lines) and unloading (dashed lines). The indentation is the
+        distance by which the apex of the shape without roughness has moved beyond the undeformed plane of the elastic
+        body. Tension is negative. Every seed is a line of its own.""",
+        """Colours become brighter with the rms height of the roughness; runs without roughness are black."""
+        if not any(each.contact for each in series)
+        else "",
+    )
     largest = max(float(run["contact_radius"].max()) for run in runs)
     theories = {}
     for ax, of_panel in zip(panels.ravel(), shown, strict=False):
@@ -65,6 +82,12 @@ def figure(campaign: xr.DataTree, *, study: str) -> Figure:
         ax.label_outer()
     for ax in panels.ravel()[len(shown) :]:
         ax.remove()
+    say(fig, *(_THEORY_WORDS[name] for name in ("Hertz", "JKR") if name in theories))
+    dataset = campaign[study].to_dataset()
+    if "JKR" in theories and (dataset["surface_energy"] == 0).any():
+        say(fig, "Runs without adhesion have no line of JKR.")
+    if lacks_sphere(dataset):
+        say(fig, "Shapes without a radius and layers have neither line." if theories else "")
     named = [] if len(shown) > 1 else series
     handles = {each.name: legend_handle(color=each.colour, **_LOOP) for each in named}
     handles |= {name: legend_handle(color=BLACK, ls=dashes, **_LOOP) for name, dashes in BRANCH_DASHES.items()}

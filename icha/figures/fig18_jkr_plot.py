@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.figures.drawn import Name, plot
+from icha.figures.captions import only_spheres, without_fit
+from icha.figures.drawn import Name, plot, say
 from icha.figures.indenter_curves import select_series
 from icha.figures.looks import legend_below
 from icha.figures.style import GREY, in_style, legend_handle, new_panels
@@ -21,6 +22,15 @@ if TYPE_CHECKING:
 _TITLES = {"approach": ("loading", "o"), "retraction": ("unloading", "s")}
 _STATES = {"ls": "none", "ms": 2.8, "mew": 0.6, "mfc": "white"}
 _FIT = {"lw": 0.9, "ls": "-"}
+
+_CAPTION = """Linearised plot of the equation of Johnson, Kendall and Roberts (JKR), for the first loading (a) and the
+last unloading up to the largest tension (b). Here F is the force, R the radius of the smooth sphere, and a the radius
+of a circle with the true contact area. A smooth sphere with a Tabor parameter of 3 or more gives a straight line of
+slope 3/(4 E*), and the work of adhesion w follows from the value at F = 0, 3 sqrt(8 π E* w)/(4 E*). Markers are states
+of all seeds, at most one hundred of each run at equal steps of the indentation. States with F/a^(3/2) below -sqrt(8 π
+E* Δγ), where no sphere of JKR has contact, are not shown. Lines are fits of JKR with the given E* and R, one for each
+seed. A fit minimises the squared differences of a³ at given F, so states with a large radius have most weight. The
+legend gives the means over the seeds of the fitted work of adhesion."""
 
 
 @in_style
@@ -47,6 +57,8 @@ def figure(campaign: xr.DataTree, *, study: str) -> Figure:
                 drawn.append((branch, each, labels, run, x[inside], y[inside]))
     scale, unit = choose_unit(max(float(np.abs(x).max(initial=0.0)) for *_, x, _ in drawn), "N")
     fig, [panels] = new_panels(3.0, sharex=True, sharey=True)
+    dataset = campaign[study].to_dataset()
+    say(fig, _CAPTION, without_fit(dataset), only_spheres(dataset))
     for branch, each, labels, run, x, y in drawn:
         ax = panels[list(_TITLES).index(branch)]
         plot(ax, x * scale, y * 1e3, Name("states", labels), marker=_TITLES[branch][1], mec=each.colour, **_STATES)

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.figures.drawn import Name, plot
+from icha.figures.captions import only_spheres, without_fit
+from icha.figures.drawn import Name, plot, say
 from icha.figures.indenter_curves import select_series
 from icha.figures.looks import distinct_colours, legend_below
 from icha.figures.select import NothingToDraw
@@ -28,6 +29,13 @@ _QUANTITIES = {
 _ONE_SEED = {"ls": "none", "ms": 3.2, "mew": 0.6, "mfc": "white"}
 _MEAN = {"lw": 0.9, "ms": 5.0}
 
+_CAPTION = """Apparent work of adhesion of rough spheres, divided by the work of adhesion Δγ of the material, against
+the rms height of the roughness. Circles are fits of the theory of Johnson, Kendall and Roberts (JKR) to the first
+loading, squares fits to the last unloading up to the largest tension. Each fit compares cubes of contact radii at given
+forces, with the given E* and R. Triangles are the pull-off force divided by the pull-off force 3/2 π Δγ R of a smooth
+sphere. Closed markers are means over the seeds; open markers are the single seeds. Lines join means of the same surface
+or shape and the same material. Values of a smooth sphere by JKR are 1."""
+
 
 @in_style
 def figure(campaign: xr.DataTree, *, study: str) -> Figure:
@@ -44,6 +52,8 @@ def figure(campaign: xr.DataTree, *, study: str) -> Figure:
     colours = distinct_colours(len(contacts))
     fig = new_figure(1.25 * ONE_COLUMN, 2.9)
     ax = fig.subplots()
+    dataset = campaign[study].to_dataset()
+    say(fig, _CAPTION, without_fit(dataset), only_spheres(dataset))
     handles = {name: legend_handle(color=colour, lw=4) for name, colour in zip(contacts, colours, strict=True) if name}
     for (k, (quantity, (name, marker))), contact in itertools.product(enumerate(_QUANTITIES.items()), contacts):
         # Colours distinguish the quantities, or surfaces and materials if there are several.

@@ -6,11 +6,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.figures.drawn import plot
+from icha.figures.drawn import plot, say
 from icha.figures.style import BLUE, GREY, VERMILLION, in_style, new_panels
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+_CAPTION = """Force F (a) and contact radius a (b) against the approach δ, for one asperity by the theory of Johnson,
+Kendall and Roberts (JKR). On loading (solid line), the asperity snaps into contact at point A, where the gap equals
+Wu's jump-in distance. Only this distance depends on the Tabor parameter μ; the value of μ above panel (b) is an
+example. On unloading (dashed line), the asperity follows the stable branch to the jump-off point C, and detaches. Point
+B is the pull-off point under load control. The dotted line is the unstable branch. Negative forces are tensile."""
 
 
 @in_style
@@ -30,6 +36,7 @@ def figure(*, tabor_parameter: float = 3.0) -> Figure:
     a_pull = float(np.cbrt(9 * np.pi / 8))  # dF/da = 0
 
     fig, [axes] = new_panels(2.9)
+    say(fig, _CAPTION)
     for ax, value in ((axes[0], lambda a: law.force(a, R)), (axes[1], lambda a: a)):
         ax.axhline(0, color="0.75", lw=0.6, zorder=0)
         ax.axvline(0, color="0.75", lw=0.6, zorder=0)

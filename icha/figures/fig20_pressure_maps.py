@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.datasets.labels import RunLabels
+from icha.figures.drawn import say
 from icha.figures.looks import run_label
 from icha.figures.maps import average_blocks
 from icha.figures.style import format_number, in_style, new_panels
@@ -61,7 +62,19 @@ def figure(campaign: xr.DataTree, maps: xr.Dataset, *, run: Sequence) -> Figure:
     columns = min(len(shown), _COLUMNS)
     rows = -(-len(shown) // columns)
     fig, panels = new_panels(2.7 * rows + 0.1, rows, columns, width=2.15 * columns + 0.65, sharex=True, sharey=True)
-    window = _window(touching.any(axis=0), str(maps["boundary"].values) == "free")
+    free = str(maps["boundary"].values) == "free"
+    say(
+        fig,
+        """Maps of the contact pressure at snapshots of one run with boundary elements, in the order of the path.
+        Compression is red, tension is blue, each with its own scale, and grey regions are out of contact.""",
+        "Tension is largest at the edges of contact." if float(maps["surface_energy"]) else "",
+        """The title of a panel gives branch and force. All maps show the region around the largest contact."""
+        if free
+        else """The title of a panel gives the reduced pressure p* = F/(E* h'rms A0) and the contact area, to which
+        cells at the edges contribute in part.""",
+        "The scales end at the 98 % quantiles of pressure and tension in contact in all maps.",
+    )
+    window = _window(touching.any(axis=0), free)
     for ax, k in zip(panels.ravel(), shown, strict=False):
         cells = np.where(touching[k], pressure[k] * factor, np.nan)
         half = side / len(cells) / 2

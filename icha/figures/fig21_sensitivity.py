@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.datasets.quantities import symbol_of
-from icha.figures.drawn import record
+from icha.figures.drawn import record, say
 from icha.figures.looks import legend_below
 from icha.figures.samples import responses, title_of
 from icha.figures.select import NothingToDraw
@@ -37,6 +37,13 @@ def figure(sensitivity: xr.DataTree, *, study: str, target: int = -1) -> Figure:
     height = rows * (0.75 + 0.34 * len(names)) + 0.4
     width = TWO_COLUMNS * columns / _COLUMNS if columns > 1 else 0.5 * TWO_COLUMNS
     fig, panels = new_panels(height, rows, columns, width=width, sharex=True, sharey=True)
+    say(
+        fig,
+        """Share of the variance of the logarithm of each result that each sampled parameter causes. Filled bars: the
+        parameter alone (first-order index). Open bars: the parameter alone and together with other parameters (total
+        index). The shares are those of a polynomial that is fitted to the cases; error bars are intervals of 90 %
+        (jackknife over the cases).""",
+    )
     places = np.arange(len(names))
     handles = {}
     for k, ax in enumerate(panels.ravel()):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.datasets import quantities
-from icha.figures.drawn import plot
+from icha.figures.drawn import plot, say
 from icha.figures.looks import legend_below
 from icha.figures.samples import best_model, responses, scale_of, title_of
 from icha.figures.style import BLUE, TWO_COLUMNS, VERMILLION, in_style, legend_handle, logarithmic_axes, new_panels
@@ -47,6 +47,13 @@ def figure(
     rows = -(-len(names) // columns)
     width = TWO_COLUMNS * columns / _COLUMNS if columns > 1 else 0.5 * TWO_COLUMNS
     fig, panels = new_panels(2.0 * rows + 0.3, rows, columns, width=width, sharey=True)
+    say(fig, "A result of every sampled case against each sampled parameter.")
+    if int(row["degree"]):
+        say(
+            fig,
+            """Lines: mean over the other parameters, from the polynomial of figure 21, between the 5 % and the 95 %
+            quantile of the parameter.""",
+        )
     for k, ax in enumerate(panels.ravel()):
         if k >= len(names):
             ax.remove()

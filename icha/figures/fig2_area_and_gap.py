@@ -8,8 +8,10 @@ import numpy as np
 
 from icha.datasets.quantities import label_of, quantity
 from icha.figures import curves
-from icha.figures.drawn import Name, plot, record
+from icha.figures.captions import theories_of_flat_surfaces
+from icha.figures.drawn import Name, plot, record, say
 from icha.figures.ensembles import draw_members
+from icha.figures.looks import ASPERITIES_NAME
 from icha.figures.style import BLACK, GREY, in_style, logarithmic_axes, new_panels
 
 if TYPE_CHECKING:
@@ -27,6 +29,24 @@ _SEPARATIONS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5)
 _ESTIMATE = {"ls": (0, (6, 1.5, 1, 1.5, 1, 1.5)), "lw": 0.9, "zorder": 1.9}
 # For each lower panel, the function that returns the points of a run, and the difference that is drawn.
 _QUANTITIES = ((curves.area_points, "area_error"), (curves.gap_points, "separation_error"))
+
+_COMPARED = """Panels (c) and (d) show the relative difference between asperity model and boundary elements (BEM), on
+the same topographies at the same loads; thin lines join the symbols, which end at the largest load that both models
+reach."""
+_CIAVARELLA = """Lines with two dots show the estimate of Ciavarella (2018) in place of the asperity model; it follows
+from boundary elements without adhesion, and its loads are not those of the symbols."""
+_PERSSON = "Other lines are theories of contact without adhesion: that of Persson for the area (a)."
+_BUSH = "That of Bush, Gibson and Thomas, also for the area, is grey and dashed."
+_YANG = "That of Yang and Persson for the separation is in (b)."
+_XU = "Xu et al. (2024) correct Persson's theory for the variance of the pressure in partial contact."
+_SUMMITS = {
+    "Greenwood & Williamson": "The theory of Greenwood and Williamson, in (a) and (b), describes separate summits.",
+    "Fuller & Tabor": """Of these theories, only that of Fuller and Tabor, also in (a) and (b) and of separate summits,
+    includes adhesion.""",
+}
+_GFMD = """Oblique crosses are published results of Green's function molecular dynamics without adhesion for this
+spectrum (Xu et al., 2024), with standard deviations over surfaces. These areas are counts of cells on a coarse grid; a
+correction for the perimeter would make them up to 7 % smaller."""
 
 
 @in_style
@@ -52,6 +72,13 @@ def figure(
     compared = [(line, truths[line.runs.contact]) for line in shown.lines if line.runs.contact in truths]
     fig, axes = new_panels(4.5, 2, sharex=True, height_ratios=(1, _LOWER)) if compared else new_panels(3.3)
     left, right = axes[0]
+    gap = label_of(curves.gap_name(dataset)).partition("  ")[0]
+    say(
+        fig,
+        f"""Ratio of contact area and load (a), A/A0 divided by the reduced pressure F/(E* h'rms A0), and {gap} divided
+        by rms height (b), against the reduced pressure.""",
+    )
+    _say_symbols(fig, shown, dataset)
     panels = {left: curves.ratio_points, right: curves.gap_points}
     (pressures, ratios), (_, gaps) = (
         map(curves.drop_rounding_errors, drawn) for drawn in curves.draw_curves(shown, panels, unloading=True)
@@ -60,10 +87,12 @@ def figure(
     curves.limit_ratios(left, ratios)
     if references is not None:
         _draw_references(left, right, references, x)
+        if dataset.sizes["surface"] > 1:
+            say(fig, "Theories are those of the first surface.")
         _draw_separate_summits(left, right, references, dataset, shown.looks)
     left.set_ylabel(label_of("area_over_load"))
     low, high = gaps.min() / 1.4, gaps.max() * 1.4
-    right.set(ylabel=curves.gap_label(dataset), ylim=(low, high))
+    right.set(ylabel=label_of(curves.gap_name(dataset)), ylim=(low, high))
     right.yaxis.set_major_formatter("{x:g}")
     right.yaxis.set_minor_formatter("")
     if high < 60 * low:
@@ -80,7 +109,9 @@ def figure(
         ax.axhline(0, color="0.6", lw=0.6, zorder=0)
         ax.set_ylabel(rf"${quantity(error).symbol}$  (%)")
     if compared:
+        say(fig, _COMPARED)
         _draw_estimates(axes[1], shown, compared)
+    say(fig, theories_of_flat_surfaces(dataset))
     for ax in axes[-1]:
         ax.set(xlim=x, xlabel=label_of("reduced_pressure"))
     curves.add_legend(fig, [left, right, *axes[1:].ravel()], shown)
@@ -92,6 +123,8 @@ def _in_physical_units(campaign, study, references):
     shown, dataset = curves.study_curves(campaign, study), campaign[study].to_dataset()
     pressure, gap = curves.physical_units(dataset)
     fig, [(left, right)] = new_panels(3.3)
+    say(fig, "Contact area divided by nominal area (a), and mean gap (b), against the nominal pressure.")
+    _say_symbols(fig, shown, dataset)
     panels = {
         left: curves.physical_points("contact_area_fraction", pressure),
         right: curves.physical_points("mean_gap", pressure, gap.factor),
@@ -108,9 +141,11 @@ def _in_physical_units(campaign, study, references):
         p = references["reduced_pressure"].values * modulus * pressure.factor
         inside = (p >= limits[0]) & (p <= limits[1])
         look = {"color": BLACK, "lw": 1, "zorder": 2}
+        say(fig, _PERSSON)
         plot(left, p[inside], references["persson_area_fraction"].values[inside], label="Persson", **look)
         if "persson_reduced_separation" in references:
             separation = references["persson_reduced_separation"].values[inside] * height * gap.factor
+            say(fig, _YANG)
             plot(right, p[inside], separation, label="Yang & Persson", **look | {"ls": (0, (7, 2))})
     for ax in (left, right):
         ax.set_xlabel(pressure.label)
@@ -118,6 +153,22 @@ def _in_physical_units(campaign, study, references):
     right.set_ylabel(gap.label)
     curves.add_legend(fig, [left, right], shown)
     return fig
+
+
+def _say_symbols(fig, shown, dataset):
+    """Explain symbols and their filling in the caption."""
+    curves.say_models(fig, shown, " in loading", stars="Crosses and stars")
+    energies = {curve.runs.surface_energy > 0 for curve in (*shown.lines, *shown.crosses)}
+    if False in energies and any(curve.runs.model_name == ASPERITIES_NAME for curve in shown.lines):
+        say(fig, "Open shapes are without adhesion.")
+    if len(energies) > 1 and shown.crosses:
+        say(
+            fig,
+            """Crosses without adhesion are larger. Where adhesion has little effect, closed shapes and small crosses
+            lie inside open shapes and large crosses.""",
+        )
+    if dataset.sizes["seed"] == 1:
+        say(fig, "Results are of one realisation of the surface.")
 
 
 def _difference(line, truth, points):
@@ -153,6 +204,7 @@ def _pressed(points, run):
 
 def _draw_references(left, right, references, limits):
     """Draw published results and theories of rough contact; `limits` are the smallest and the largest load."""
+    say(left, _PERSSON, _BUSH, _XU)
     p, black = references["reduced_pressure"].values, {"color": BLACK, "lw": 1, "zorder": 2}
     shown = (p >= limits[0] / 1.5) & (p <= limits[1] * 1.5)
     plot(left, p[shown], references["persson_area_fraction"].values[shown] / p[shown], label="Persson", **black)
@@ -173,9 +225,11 @@ def _draw_references(left, right, references, limits):
             references[f"gfmd_{n}"].values for n in ("reduced_pressure", "area_fraction", "area_scatter")
         )
         points = {"fmt": "x", "color": BLACK, "ms": 6, "mew": 1.2, "lw": 1.2, "zorder": 5}
+        say(left, _GFMD)
         record(left, load, area / load, "GFMD", low=(area - scatter) / load, high=(area + scatter) / load)
         left.errorbar(load, area / load, scatter / load, label="GFMD, no adhesion", **points)
     if "persson_reduced_separation" in references:
+        say(left, _YANG)
         plot(
             right,
             p[shown],
@@ -208,6 +262,7 @@ def _draw_estimates(axes, shown, compared):
             at = states[0][inside]
             known = common_loads.interpolate(load, true, at, logarithmic=points is curves.area_points)
             name = Name("Ciavarella, from runs without adhesion", truth.runs.labels._replace(seed=seed))
+            say(ax, _CIAVARELLA)
             plot(ax, at, 100 * (values[inside] / known - 1), name, color=colour, **_ESTIMATE)
             named = colour if single else GREY
             ax.plot([], [], color=named, label="Ciavarella, from runs without adhesion", **_ESTIMATE)
@@ -241,6 +296,7 @@ def _draw_separate_summits(left, right, references, dataset, looks):
         if material in looks.materials and np.isclose(slope, dataset["rms_slope"].values, rtol=1e-9).any():
             theories.append(("Fuller & Tabor", (0, (1, 1.5)), looks.material_colour(material), "fuller_tabor", theory))
     for label, dashes, colour, name, theory in theories:
+        say(left, _SUMMITS[label])
         p, separation = (theory[f"{name}_reduced_{quantity}"].values for quantity in ("pressure", "separation"))
         look, pressed = {"ls": dashes, "lw": 0.8, "zorder": 1.8}, p > 0
         area = theory["summit_area_fraction"].values[pressed] / p[pressed]

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.contact.attraction import FINITE_RANGE
-from icha.figures.curves import add_snapshot_legend, drop_rounding_errors, snapshot_looks
-from icha.figures.drawn import plot
+from icha.figures.captions import attractions_of, theories_of_flat_surfaces
+from icha.figures.curves import add_snapshot_legend, drop_rounding_errors, say_snapshot_models, snapshot_looks
+from icha.figures.drawn import plot, say
 from icha.figures.ensembles import draw_members, join_bins
 from icha.figures.looks import MODEL_MARKERS, REFERENCE_NAME, TRUTH_LINE
 from icha.figures.select import has_shape, select_snapshots
@@ -36,6 +37,25 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
     lines = select_snapshots(campaign, study, kind, target)
     each_look, looks = snapshot_looks(campaign, study, lines)
     fig, [(left, right)] = new_panels(3.1)
+    dataset = campaign[study].to_dataset()
+    say(
+        fig,
+        """Probability density of the gap u (a), on logarithmic axes, and of the contact pressure p (b), both over the
+        whole nominal area. Gaps are in units of the rms height, pressures in units of E* h'rms. The title of panel (a)
+        gives the state.""",
+    )
+    say_snapshot_models(fig, lines, "Dashed lines with crosses")
+    say(fig, "The density in panel (b) has the integral A/A0.")
+    shown = [run for line in lines for run, _ in (*line.members, *line.truths)]
+    if FINITE_RANGE in attractions_of(shown):
+        say(fig, "That of boundary elements at a finite range also contains tension across gaps.")
+    say(
+        fig,
+        """The density in panel (a) has the integral 1 - A/A0 - f, where f is the fraction of the nominal area with a
+        negative computed gap outside the spots.""",
+    )
+    if any(line.runs.surface_energy for line in lines):
+        say(fig, "Adhesion causes the tensile tail at negative pressures.")
     lowest, highest, top, floor = -0.3, 0.3, 0.0, 1.0
     tails = []
     for line, look in zip(lines, each_look, strict=True):
@@ -65,10 +85,17 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
         p, density = singular_tail(truths, 1.05 * lowest)
         plot(right, p, density, "singular tension at the edge", ls=":", lw=1.1, color=colour, zorder=3)
         if p.size:
+            say(
+                right,
+                """Boundary elements resolve only the mean tension in a grid cell, so their tensile tail ends in a peak.
+                For tensions that the grid does not resolve, dotted lines show the density of the singular tension at
+                the edge of contact, L K_c²/(π|p|³A0), where L is the length of this edge and K_c² = 2 E* Δγ.""",
+            )
             right.plot([], [], ls=":", lw=1.1, color=GREY, label="singular tension at the edge")
     load = np.mean([float(state_of(run, at)["reduced_pressure"]) for run, at in lines[-1].members])
     _finish(left, right, (lowest, highest), top, 0.0 if has_shape(lines[-1].members[0][0]) else load)
-    add_snapshot_legend(fig, [left, right], campaign[study].to_dataset(), lines, looks)
+    say(fig, theories_of_flat_surfaces(dataset))
+    add_snapshot_legend(fig, [left, right], dataset, lines, looks)
     return fig
 
 
@@ -78,6 +105,7 @@ def _finish(left, right, pressures, highest, load):
 
     if load > 0:
         p = np.linspace(0.002, pressures[1], 300)
+        say(right, "The black line is Persson's theory of contact without adhesion.")
         plot(right, p, persson_pressure_density(p, load), color=BLACK, lw=0.9, label="Persson", zorder=2)
     right.set_xlim(1.05 * np.array(pressures))
     if highest > 0:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.datasets.labels import RunLabels
-from icha.figures.drawn import Name
+from icha.figures.captions import attractions_of, range_of_attraction
+from icha.figures.drawn import Name, say
 from icha.figures.looks import NOT_APPLICABLE_ALONE, REFERENCE_NAME, run_label
 from icha.figures.maps import draw_map, draw_spots, record_spots, topography_of, wrap_circles
 from icha.figures.select import is_applicable, select_complete_run
@@ -29,6 +30,13 @@ _MANY_SPOTS = 2000
 _RED = (0.9, 0.0, 0.05)
 # Names and colours of nodes: in contact in no model, only with asperities, only with boundary elements, in both models.
 _STATES = (("", "white"), ("asperities only", _RED), ("boundary elements only", "black"), ("both", "0.72"))
+
+_CAPTION = """Contact spots of the asperity model (red, in true size and position) on a map of the topography, whose
+mean height is zero. The title gives surface, material and load."""
+_COMPARED = """Panel (b) shows the contact of boundary elements on the same topography at the same load (black). Panel
+(c) enlarges the framed region around the largest spot of (a): edges of contact of the asperity model (red) and of
+boundary elements (black), also of holes. Panel (d) shows where both models are in contact, and where only one is; the
+overlap is the ratio of the areas in contact in both models and in at least one."""
 
 
 @in_style
@@ -67,6 +75,7 @@ def figure(
     topography = topography_of(data, surface)
     circles, corner, width = _view(data, at, topography)
     fig, panels = new_panels(*(3.35, 1) if beside is None else (6.9, 2))
+    say(fig, _CAPTION)
     whole, enlarged = panels[0, 0], panels[0, 1] if beside is None else panels[1, 0]
     heights = {"cmap": "cividis", "vmin": -topography.highest, "vmax": topography.highest}
     image = topography.draw(whole, **heights)
@@ -79,9 +88,14 @@ def figure(
     area = rf"$A/A_0$ = {float(state['contact_area_fraction']):.3f}"
     whole.set_title(area if beside is None else f"asperities, {area}", loc="right")
     enlarged.set_title(f"enlarged ×{topography.side / width:.0f}", loc="right")
-    if beside is not None:
+    if beside is None:
+        say(fig, "Panel (b) enlarges the framed region around the largest spot.")
+    else:
+        say(fig, _COMPARED, range_of_attraction(attractions_of([truth])))
         covered = contact_of_spots(data, at, len(beside["contact_map"]))
         _draw_boundary_elements(panels, topography, (corner, width), heights, beside, covered)
+    if str(data["boundary"].values) == "periodic":
+        say(fig, "The map is one period; circles continue across its borders.")
     load = rf"$F/(E^{{\ast}}h′_{{\mathrm{{rms}}}}A_0)$ = {format_number(float(state['reduced_pressure']))}"
     title = f"{run_label(campaign, labels)}, {load}"
     fig.suptitle(title if is_applicable(data) else f"{title}\n{NOT_APPLICABLE_ALONE}", fontsize="medium")

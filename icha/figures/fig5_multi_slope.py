@@ -14,9 +14,10 @@ from icha.figures.curves import (
     draw_curves,
     limit_ratios,
     ratio_points,
+    say_models,
     study_curves,
 )
-from icha.figures.drawn import plot
+from icha.figures.drawn import plot, say
 from icha.figures.looks import ASPERITIES_NAME, MODEL_MARKERS, REFERENCE_NAME, TRUTH_LINE, model_handle, surface_label
 from icha.figures.select import has_shape
 from icha.figures.style import DASHES, in_style, new_panels
@@ -29,6 +30,9 @@ if TYPE_CHECKING:
 
 # Largest number of surfaces that have their own columns of panels.
 _MOST_SURFACES = 3
+
+_AREA = "Contact area divided by nominal area, A/A0, against the relative load F/(E* A0) (left), and on the right: "
+_SHAPED = "Because a surface has a shape, relative loads F/(E* A0) take the place of reduced pressures."
 
 
 @in_style
@@ -69,6 +73,16 @@ def figure(
     if looks.slopes_per_surface and len(surfaces) <= _MOST_SURFACES:
         columns = [(ratio, surface) for surface in surfaces]
     fig, panels = new_panels(0.5 + 2.8 * len(rows), len(rows), len(columns), sharex="col")
+    shaped = ratio is not ratio_points
+    by_load = "relative load F/(E* A0)" if shaped else "reduced pressure"
+    unit = "relative load" if shaped else "reduced pressure F/(E* h'rms A0)"
+    area = (_area_at_load, None) in columns
+    say(
+        fig,
+        (_AREA if area else "") + f"Ratio of contact area and load, A/A0 divided by the {unit}, against the {by_load}.",
+        _SHAPED if shaped else "",
+    )
+    say_models(fig, curves)
     measured = [
         (read_columns(table, known["columns"]), known) for table, known in zip(tables, measurements, strict=True)
     ]
@@ -93,6 +107,22 @@ def figure(
     for ax, (points, _) in zip(panels[-1], columns, strict=True):
         ax.set_xlabel(label_of(_DRAWN[points][0]))
     add_legend(fig, panels.ravel(), curves)
+    materials = {each.runs.surface_energy > 0 for each in curves.lines}
+    if len(looks.places) > 1 and len({slope for _, slope in looks.places}) > 1:
+        if False in materials:
+            say(
+                fig,
+                """Without adhesion, the ratios of one topography at different slopes coincide, so that they hide each
+                other.""",
+            )
+        if True in materials:
+            say(fig, "Adhesion increases the contact area, most for the smallest slopes.")
+    if own_rows:
+        open_circles = "Open circles are without adhesion. " if False in materials else ""
+        say(fig, f"{open_circles}Rows of panels have different scales.")
+    if measurements:
+        named = "; ".join(f"{each['label']} ({each['citation']})" for each in measurements)
+        say(fig, f"Lines without markers are measurements: {named}.")
     return fig
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from icha.figures.drawn import Name
+from icha.figures.drawn import Name, say
 from icha.figures.looks import NOT_APPLICABLE_ALONE, graded_colours, legend_below
 from icha.figures.maps import draw_spots, record_spots, wrap_circles
 from icha.figures.select import is_applicable, select_by_labels, select_runs, snapshot_label
@@ -39,6 +39,14 @@ def figure(
     colours = dict(zip(slopes, graded_colours(len(slopes)), strict=True))
 
     fig, [panels] = new_panels(3.8, sharey=True)
+    say(
+        fig,
+        """Contact spots of the asperity model, in true size, on one topography that is scaled to several rms slopes.
+        All slopes have the same load F/(E* A0) in panel (a), and the same contact area A/A0 in panel (b). At a given
+        load, a steeper surface has less contact area. Its spots lie within the spots of flatter surfaces, and are drawn
+        on top of them. At a given contact area, the spots of all slopes nearly coincide, so every slope fills one
+        sector of each circle in panel (b).""",
+    )
     length, unit = choose_unit(float(by_slope[slopes[0]]["period"]), "m")
     for ax, kind in zip(panels, _KINDS, strict=True):
         _draw_slopes(ax, by_slope, names, kind, colours, length)

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.figures.curves import add_snapshot_legend, snapshot_looks
-from icha.figures.drawn import plot
+from icha.figures.curves import add_snapshot_legend, say_snapshot_models, snapshot_looks
+from icha.figures.drawn import plot, say
 from icha.figures.ensembles import draw_members, join_bins
-from icha.figures.looks import MODEL_MARKERS, REFERENCE_NAME, TRUTH_LINE
+from icha.figures.looks import ASPERITIES_NAME, MODEL_MARKERS, REFERENCE_NAME, TRUTH_LINE
 from icha.figures.select import select_snapshots
 from icha.figures.style import TWO_COLUMNS, in_style, logarithmic_axes, new_panels
 from icha.support.formatting import choose_unit
@@ -30,6 +30,8 @@ _ALONE = 4.5
 # Largest number of points of a cumulative curve; more points would not be distinguishable.
 _CURVE_POINTS = 300
 
+_ABOVE = "number per nominal area of patches that are larger than A."
+
 
 @in_style
 def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target: float | None = None) -> Figure:
@@ -45,6 +47,14 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
     # Without enough patches for a density, the figure has only the second panel.
     dense = max(len(patch_density(each, cell)[0]) for each, _ in areas) >= _FEWEST_BINS
     fig, [panels] = new_panels(3.1, columns=1 + dense, width=TWO_COLUMNS if dense else _ALONE, sharex=True)
+    density = """number of patches per nominal area and per interval of the patch area A (a), where neighbouring
+    intervals with few patches are joined, and """
+    say(fig, "Sizes of the contact patches at the load given in the figure: " + (density if dense else "") + _ABOVE)
+    say_snapshot_models(fig, lines, "Dashed lines")
+    if any(line.truths for line in lines) or lines[0].runs.model_name != ASPERITIES_NAME:
+        say(fig, "Patches of boundary elements are grid cells in contact that are connected by common edges.")
+    if lines[0].runs.model_name == ASPERITIES_NAME:
+        say(fig, "In the asperity model, united spots count as one patch.")
     for line, look, (own, true) in zip(lines, each_look, areas, strict=True):
         smooth = look | {"marker": "none", "lw": 1.4 * look["lw"]}
         drawn = [(patch_density, look, MODEL_MARKERS[REFERENCE_NAME]), (patches_above, smooth, "none")]

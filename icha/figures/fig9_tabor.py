@@ -8,8 +8,8 @@ import numpy as np
 
 from icha.contact.attraction import FINITE_RANGE, SHORT_RANGE
 from icha.datasets.quantities import label_of
-from icha.figures.curves import gap_label
-from icha.figures.drawn import plot, record
+from icha.figures.curves import gap_name
+from icha.figures.drawn import plot, record, say
 from icha.figures.ensembles import Points, points_handles
 from icha.figures.looks import Looks, legend_below, named_handles
 from icha.figures.select import ContactRuns, NothingToDraw, group_by_contact, select_runs, snapshot_label
@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 # The axis of the Tabor parameter is logarithmic if the ratio of its largest to its smallest value exceeds this number.
 _SPAN = 10.0
 _STATE = ("contact_area_fraction", "reduced_separation")
+
+_TABOR = """The Tabor parameter is (R Δγ²/E*²)^(1/3) divided by the range of attraction. R is the radius of a sphere; on
+a rough surface, 1/R is the rms curvature."""
 
 
 @in_style
@@ -61,6 +64,16 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
     interfaces = dataset.sel(material=list(dict.fromkeys(material for material, *_ in contacts)))
     looks = Looks(campaign, interfaces, contacts)
     fig, [panels] = new_panels(3.1)
+    gap = label_of(gap_name(dataset)).partition("  ")[0]
+    say(
+        fig,
+        f"""Real contact area divided by nominal area (a) and {gap} divided by rms height (b) at the load given in the
+        figure.""",
+        _TABOR,
+        """A line joins runs that differ only in the range of attraction. At a given surface energy, asperities with a
+        longer range (smaller Tabor parameter) jump into contact from a larger distance.""",
+        "Dashed lines are results without adhesion." if bare else "",
+    )
     counts, drawn = [], []
     for (contact, applicable), line in curves.items():
         points = Points(line, "tabor_parameter", *_STATE)
@@ -74,13 +87,13 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
             mean = np.mean([float(state[name]) for group in line for state in group.by_seed.values()])
             record(ax, [min(drawn), max(drawn)], [mean, mean], line[0].drawn_name)
             ax.axhline(mean, ls=(0, (5, 2)), lw=1, zorder=1, **look)
-    for ax, label in zip(panels, (label_of("contact_area_fraction"), gap_label(dataset)), strict=True):
+    for ax, label in zip(panels, map(label_of, ("contact_area_fraction", gap_name(dataset))), strict=True):
         if max(drawn) > _SPAN * min(drawn):
             logarithmic_axes(ax, "x")
         _finish(ax, min(drawn))
         ax.set_ylabel(label)
     panels[0].set_title(shown, loc="right")
-    legend_below(fig, looks.handles() | named_handles(panels) | points_handles(counts))
+    legend_below(fig, looks.handles() | named_handles(panels) | points_handles(fig, counts))
     return fig
 
 
@@ -92,6 +105,15 @@ def _pull_off_of_spheres(runs):
     tabor, pull_off, loss = np.array([_values_of_sphere(run) for run in runs]).T
     resolved = np.array([run.attrs.get("attraction") == FINITE_RANGE for run in runs])
     fig, [panels] = new_panels(3.1)
+    markers = "Filled markers are boundary elements at the range itself." if resolved.any() else ""
+    markers += " Open markers are boundary elements in the limit of a short range." if not resolved.all() else ""
+    say(
+        fig,
+        "Pull-off force (a) and energy lost from first contact to separation (b) of smooth spheres.",
+        _TABOR,
+        markers,
+        "The solid line is the theory of Maugis for a constant attraction. JKR and DMT are its limits.",
+    )
     for ax, values in zip(panels, (pull_off, loss), strict=True):
         ax.plot(tabor, values, color=GREY, lw=0.6, zorder=1)
         for chosen, fill, label in ((resolved, "C0", FINITE_RANGE), (~resolved, "white", SHORT_RANGE)):

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 from icha.datasets.results import figure_number
 from icha.datasets.table import as_csv
-from icha.figures.captions import caption_of, count_runs, sentence_on_loops, sentence_on_measurements, texts_of
-from icha.figures.drawn import table_of
+from icha.figures.captions import count_runs, units_of_shapes
+from icha.figures.drawn import caption_of, say, table_of
 from icha.figures.style import GREY, in_style, new_figure, save
 from icha.support.atomic_files import whole_file
 from icha.support.scripts import caption_in
@@ -60,15 +60,11 @@ def draw_figure(
     from icha.figures.select import NothingToDraw
 
     data = {argument: _read(files) for argument, files in inputs.items()}
-    shown = ""
     try:
         figure = figure_module(name).figure(**data, **arguments)
-        shown = texts_of(figure, data, studies)
-        if "script" in data:
-            caption = caption_in(data["script"])
-        else:
-            caption = caption_of(name, shown, sentence_on_loops(data, studies))
-            caption = f"{caption} {sentence_on_measurements(arguments.get('measurements', ()))}".strip()
+        groups = getattr(data.get("campaign"), "children", {})
+        say(figure, units_of_shapes(figure, [groups[study].to_dataset() for study in studies if study in groups]))
+        caption = caption_in(data["script"]) if "script" in data else caption_of(figure)
     except NothingToDraw as reason:
         caption = f"Nothing to draw: {reason}."
         print(caption)
@@ -77,7 +73,9 @@ def draw_figure(
     with whole_file(table) as temporary:
         temporary.write_text(as_csv(table_of(figure)), encoding="utf-8")
     with whole_file(text) as temporary:
-        temporary.write_text(f"{caption} {count_runs(data, studies, shown)}".strip() + "\n", encoding="utf-8")
+        of_loss = any("loss" in axes.get_ylabel() for axes in figure.axes)
+        counts = count_runs(data, studies, of_loss=of_loss)
+        temporary.write_text(f"{caption} {counts}".strip() + "\n", encoding="utf-8")
 
 
 def _read(files):

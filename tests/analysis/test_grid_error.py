@@ -23,7 +23,7 @@ from icha.analysis.validity import statements_on_dataset
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import RunLabels
 from icha.figures import fig13_loops, fig14_pull_off, fig15_loss
-from icha.figures.captions import caption_of, sentence_on_loops
+from icha.figures.drawn import caption_of
 from icha.figures.looks import COARSE_GRID
 from icha.report.answers import answers_of, answers_table
 from validation import loop_grid
@@ -82,10 +82,9 @@ def test_loops_on_a_coarse_grid_are_named_and_pale():
     )
     for module in (fig13_loops, fig14_pull_off, fig15_loss):
         options = {"studies": ["pull"]} if module is fig15_loss else {"study": "pull"}
-        assert COARSE_GRID in legend(module.figure(coarse, **options))
+        figure = module.figure(coarse, **options)
+        assert COARSE_GRID in legend(figure) and "0.7 cells for soft on rough" in caption_of(figure)
         assert COARSE_GRID not in legend(module.figure(fine, **options))
-    for name in ("fig13_loops", "fig14_pull_off", "fig15_loss", "fig16_snap_map"):
-        assert "0.7 cells for soft on rough" in caption_of(name, "", sentence_on_loops({"campaign": coarse}, ["pull"]))
     assert {each.about: each.good for each in statements_on_dataset(fine)}["loops"]
 
 

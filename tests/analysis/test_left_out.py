@@ -147,7 +147,7 @@ def test_a_failed_check_of_the_loss_leaves_pull_off_and_areas():
 def test_the_caption_of_a_figure_of_losses_counts_the_loops_without_a_loss():
     data = {"campaign": loops(gains=(2, 3))}
     assert count_runs(data, ["pull"]) == ""
-    caption = count_runs(data, ["pull"], "hysteresis loss")
+    caption = count_runs(data, ["pull"], of_loss=True)
     assert caption.startswith("The figure shows 3 of 5 runs; 2 failed a check of the loss; the others are a biased")
 
 

@@ -34,7 +34,7 @@ from icha.figures import (
     fig10_model_error,
     fig11_distribution_error,
 )
-from icha.figures.captions import caption_of, texts_of
+from icha.figures.drawn import caption_of
 from icha.figures.looks import material_colours, some_of
 from icha.figures.maps import average_blocks, wrap_circles
 from icha.figures.registry import draw_figure
@@ -203,7 +203,10 @@ def test_fig5_draws_measurements_over_the_curves(tmp_path):
         small.tree(),
         [tmp_path / "one.csv", tmp_path / "other.csv"],
         study="slopes",
-        measurements=[measured | {"label": "Someone, 2020"}, without_slope | {"label": "Another"}],
+        measurements=[
+            measured | {"label": "Someone, 2020", "citation": "Someone"},
+            without_slope | {"label": "Another", "citation": "Another"},
+        ],
     ).axes
     found = {line.get_label(): line for line in right.get_lines() if not line.get_label().startswith("_")}
     assert set(found) == {"Someone, 2020", "Another"}
@@ -217,7 +220,7 @@ def test_fig5_draws_measurements_over_the_curves(tmp_path):
 def test_fig5_contains_measurements_far_from_the_curves(tmp_path):
     (tmp_path / "far.csv").write_text("p, a\n1e-3, 0.02\n1e-2, 0.3\n")
     far = {"columns": {"p": 1.0, "a": 1.0}, "contact_modulus": None, "material": None, "rms_slope": None}
-    tables, measurements = [tmp_path / "far.csv"], [far | {"label": "far"}]
+    tables, measurements = [tmp_path / "far.csv"], [far | {"label": "far", "citation": "Someone"}]
     _, right = fig5_multi_slope.figure(small.tree(), tables, study="slopes", measurements=measurements).axes
     low, high = right.get_ylim()
     assert low < 20 and high > 30
@@ -722,8 +725,7 @@ def test_a_density_of_fewer_than_three_bins_is_not_drawn(monkeypatch):
 
 def caption_of_fig2(study, **data):
     units = {"units": data.pop("units")} if "units" in data else {}
-    drawn = fig2_area_and_gap.figure(**data, study=study, **units)
-    return caption_of("fig2_area_and_gap", texts_of(drawn, data, [study]))
+    return caption_of(fig2_area_and_gap.figure(**data, study=study, **units))
 
 
 def test_captions_state_only_what_the_figure_contains():
@@ -800,3 +802,13 @@ def at_common(runs):
     """Nominal pressures and mean gaps of runs at the targets that they share."""
     stops = [path_steps(run) for run in runs]
     return stops[0]["nominal_pressure"].values, np.array([each["mean_gap"].values for each in stops])
+
+
+def test_fig7_has_no_legend_of_a_material_without_points():
+    """The stiffness of a material is negative at all steps."""
+    runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"]
+    changed = [
+        (k, r.assign(contact_stiffness=-r["contact_stiffness"]) if k.material == "hertz" else r) for k, r in runs
+    ]
+    names = legend(fig7_stiffness.figure(campaign_tree(changed), study="slopes"))
+    assert any("mJ/m²" in name for name in names) and not any("gamma$ = 0" in name for name in names)

@@ -13,7 +13,7 @@ from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of
 from icha.figures import fig13_loops, fig14_pull_off, fig15_loss, fig16_snap_map
-from icha.figures.captions import caption_of, texts_of
+from icha.figures.drawn import caption_of
 from icha.figures.ensembles import Points
 from icha.figures.fig15_loss import PARTS, fit_line, shares
 from icha.figures.select import ContactRuns, select_unloaded_runs
@@ -235,8 +235,7 @@ def test_captions_name_the_models_that_are_drawn(module):
     words = []
     for drawn in (runs, truths, runs + truths):
         tree = separate.tree(drawn)
-        shown = texts_of(draw(module, tree, "one"), {"campaign": tree}, ["one"])
-        words.append(caption_of(module.__name__.rsplit(".", 1)[1], shown))
+        words.append(caption_of(draw(module, tree, "one")))
     alone, truth, both = words
     assert "All symbols are the asperity model" in alone and "All symbols are boundary elements" in truth
     assert "Crosses" in both and "other symbols" in both and "All symbols" not in both

@@ -5,7 +5,6 @@ import sys
 
 from icha.configuration.figures import Figures
 from icha.datasets.results import figure_number
-from icha.figures.captions import caption_of
 from icha.figures.registry import figure_module
 
 # Plans the campaign `smoke` as `icha describe` does.
@@ -29,11 +28,9 @@ def test_a_configuration_is_read_and_described_without_figures(tmp_path, pytestc
     subprocess.run([sys.executable, "-c", LIGHT, smoke], cwd=tmp_path, check=True)
 
 
-def test_figures_are_in_the_order_of_their_numbers_and_captions_are_sentences():
+def test_figures_are_in_the_order_of_their_numbers_and_can_be_drawn():
     names = list(Figures.model_fields)
     numbers = [figure_number(name) for name in names]
     assert numbers == sorted(set(numbers)) and len(numbers) == 21
     for name in names:
         assert callable(figure_module(name).figure)
-        caption = caption_of(name, "mean separation\narea over load")
-        assert len(caption) > 80 and caption.endswith(".") and not set("{[]") & set(caption)
