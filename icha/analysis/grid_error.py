@@ -193,13 +193,6 @@ def describe_lightest_state(campaign: xr.DataTree, studies: Iterable[str]) -> st
     return found[1]
 
 
-def describe_grid(campaign: xr.DataTree, studies: Iterable[str]) -> list[str]:
-    """Return sentences on the errors of boundary elements in some studies due to the grid: loops, lightest state."""
-    studies = list(studies)
-    loops = cells_of_loops(campaign, studies)
-    return [*([describe_loops(loops)] if loops else []), *filter(None, [describe_lightest_state(campaign, studies)])]
-
-
 def error_beyond(known: float, quantity: str, length: float, patches: float, cells: float) -> str:
     """Return words on the error of the grid if the interval of an estimate does not contain this error, else "".
 

@@ -40,7 +40,6 @@ _PROBABILITY = 0.05
 # Causes. The words hold for one run and for several runs.
 FAILED, NOT_FINISHED, NOT_COMPUTED = "failed a check", "did not finish", "not computed"
 NOT_REQUESTED, NOT_COMPARED = "not requested", "not compared"
-AVERAGED_APART = "averaged separately"
 LOSS_FAILED, ENDED_EARLY = "failed a check of the loss", "ended before this state"
 ENDED_FIRST = "ended before the first target"
 NOT_APPLICABLE, NOT_POSITIVE, INFINITE = "outside the range of the model", "without a positive value", "in full contact"
@@ -49,7 +48,7 @@ _OF_STATUS = {INCOMPLETE: NOT_FINISHED, FAILED_CHECKS: FAILED, MISSING: NOT_COMP
 WITHOUT_RUN = (NOT_COMPUTED, NOT_REQUESTED)
 # Causes in the physics of a run, which depends on everything that was varied, and thus on the seed. Whether a run fails
 # in another way depends on a parameter if this parameter separates the failed runs from the others.
-_PHYSICS = (LOSS_FAILED, ENDED_EARLY, ENDED_FIRST, NOT_APPLICABLE, NOT_POSITIVE, INFINITE, NO_FIT, AVERAGED_APART)
+_PHYSICS = (LOSS_FAILED, ENDED_EARLY, ENDED_FIRST, NOT_APPLICABLE, NOT_POSITIVE, INFINITE, NO_FIT)
 
 
 class LeftOut(NamedTuple):
