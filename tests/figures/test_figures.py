@@ -15,11 +15,10 @@ from matplotlib.colors import to_hex, to_rgb
 import icha
 from icha.analysis.model_error import jaccard
 from icha.datasets.campaign_file import campaign_tree
-from icha.datasets.files import read_dataset, write_dataset
+from icha.datasets.files import write_dataset
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of
 from icha.datasets.results import FIGURE_ENDINGS
-from icha.datasets.surface_file import write_surface
 from icha.figures import (
     ensembles,
     fig1_jkr,
@@ -35,17 +34,14 @@ from icha.figures import (
     fig11_distribution_error,
 )
 from icha.figures.drawn import caption_of
-from icha.figures.looks import material_colours, some_of
+from icha.figures.looks import material_colours
 from icha.figures.maps import average_blocks, wrap_circles
 from icha.figures.registry import draw_figure
 from icha.figures.select import NothingToDraw, branches, path_steps, select_runs
 from icha.figures.style import (
-    BLACK,
     choose_unit,
     format_number,
     format_quantity,
-    logarithmic_axes,
-    new_figure,
     save,
 )
 from icha.references.theories import reference_dataset
@@ -97,28 +93,6 @@ def test_branches_begin_where_the_one_before_ends():
     assert [name for name, _ in branches(small.run())] == ["loading"]
 
 
-def test_unloading_is_a_thin_dashed_line_in_the_colour_of_the_material():
-    runs = {labels: run for labels, run in cyclic.runs().items() if (labels.study, labels.seed) == ("loops", 2)}
-    figure = fig5_multi_slope.figure(campaign_tree(runs.items()), study="loops")
-    assert legend(figure).count("unloading") == 1
-    for axes in figure.axes:
-        dashed, marked = [line for line in axes.get_lines() if line.get_linewidth() == 0.7], lines_of(axes)
-        dashed = [line for line in dashed if len(line.get_xdata())]
-        assert len(dashed) == len(marked) == 2 and all(line.is_dashed() for line in dashed)
-        assert {line.get_color() for line in dashed} == {line.get_markeredgecolor() for line in marked}
-        # The markers are those of the first loading.
-        assert all(len(line.get_xdata()) == len(small.PRESSURES) for line in marked)
-        for line in dashed:
-            # From the largest load on, as long as it is compressive.
-            assert line.get_xdata()[0] in {each.get_xdata()[-1] for each in marked}
-            assert np.nanmin(line.get_xdata()) > 0
-    run = cyclic.run(seed=2, material="soft", between=4)
-    unloading = run["reduced_pressure"].values[run["leg"].values == 1]
-    assert 0 < np.count_nonzero(unloading > 0) < len(unloading)
-    drawn = np.concatenate([line.get_xdata() for line in figure.axes[0].get_lines() if line.get_linewidth() == 0.7])
-    assert set(unloading[unloading > 0]) <= set(drawn)
-
-
 def test_the_state_of_pull_off_can_be_drawn():
     run = cyclic.run(between=2).copy(deep=True)
     run["snapshot_kind"].values[1] = "pull_off"
@@ -167,23 +141,6 @@ def test_fig4_draws_means_of_large_topographies():
     # A block of nodes from 3000 k/1024 to the next.
     rows, columns = np.arange(2929, 2932), np.arange(1464, 1467)
     assert drawn[1000, 500] == pytest.approx(np.add.outer(rows**2.0, columns * 10.0).mean())
-
-
-def test_fig4_enlarges_small_spots_more(tmp_path):
-    rng = np.random.default_rng(4)
-    grid, count = 1100, 50
-    surface = icha.Surface(rng.normal(size=(grid, grid)) * 1e-8, period=100e-6)
-    write_surface(tmp_path / "s.nc", surface, name="rough", seed=1)
-    run = small.run().drop_dims("spot")
-    spots = {name: rng.uniform(0, 1e-4, count) for name in ("spot_x", "spot_y")}
-    spots |= {"spot_radius": rng.uniform(0.05e-6, 0.1e-6, count), "spot_snapshot": np.zeros(count, int)}
-    run = run.assign({name: ("spot", values, small.run()[name].attrs) for name, values in spots.items()})
-    run["grid"] = run["grid"].copy(data=grid)
-    tree = campaign_tree([(LABELS, run)])
-    figure = fig4_contact_map.figure(tree, read_dataset(tmp_path / "s.nc"), run=LABELS)
-    whole, enlarged = (np.ptp(axes.get_xlim()) for axes in figure.axes[:2])
-    # 40 radii are 3.2 um or so, but 64 cells are more.
-    assert whole == pytest.approx(100) and enlarged == pytest.approx(100 / 16)
 
 
 def test_circles_continue_across_borders():
@@ -304,25 +261,6 @@ def test_fig9_joins_runs_that_differ_in_range_and_shows_the_adhesionless_one(mon
     tree = campaign_tree([(RunLabels("tabor", "asperities", "rough", 1, 1.0, "bare"), runs["bare"])])
     with pytest.raises(ValueError, match="study tabor: no run with adhesion is complete"):
         fig9_tabor.figure(tree, study="tabor")
-
-
-def test_fig2_marks_boundary_elements_in_the_colour_of_the_material():
-    figure = fig2_area_and_gap.figure(compared.tree_at_finite_range(), study="one")
-    for axes, name in zip(figure.axes[:2], ("contact_area_fraction", "reduced_separation"), strict=True):
-        crosses, runs = [*lines_of(axes, "1"), *lines_of(axes, "+")], lines_of(axes, "o")
-        assert len(crosses) == 2 and len(runs) == 2
-        assert {line.get_markeredgecolor() for line in crosses} == {line.get_markeredgecolor() for line in runs}
-        for line, material in zip(crosses, ("soft", "hertz"), strict=True):
-            truth = compared.errors()["one"][f"{name}_boundary_elements"].sel(material=material)
-            truth = truth.transpose("seed", "reduced_pressure", ...).mean("seed").values.ravel()
-            unit = np.array(compared.PRESSURES) if axes is figure.axes[0] else 1.0
-            # The path meets its targets up to rounding.
-            np.testing.assert_allclose(line.get_ydata(), truth / unit, rtol=1e-9)
-            np.testing.assert_allclose(line.get_xdata(), compared.PRESSURES, rtol=1e-9)
-    names = legend(figure)
-    assert names.count("boundary elements at finite range") == names.count("boundary elements") == 1
-    alone = fig2_area_and_gap.figure(small.tree(), study="single")
-    assert not lines_of(alone.axes[0], "+", "1")
 
 
 def test_fig2_compares_curves_whose_first_area_is_reached_in_tension():
@@ -446,21 +384,6 @@ def test_surfaces_of_different_slopes_are_compared_at_their_own_alone():
     assert len(figure.axes[0].containers) == 4
     names = legend(figure)
     assert sum("other" in name for name in names) == sum("rough" in name for name in names) == 2
-
-
-def test_fig10_has_panels_for_every_material_if_there_are_many_surfaces():
-    def many(node):
-        names = [f"s{k}" for k in range(9)]
-        dataset = node.to_dataset()
-        return xr.concat([dataset.assign_coords(surface=[name]) for name in names], "surface", data_vars="minimal")
-
-    parts = {f"/{name}": many(node) for name, node in compared.errors().children.items()}
-    for name, node in compared.errors().children.items():
-        parts[f"/{name}"].attrs = node.attrs
-    figure = fig10_model_error.figure(compared.tree(), xr.DataTree.from_dict(parts), study="one")
-    assert [len(axes.containers) for axes in figure.axes] == [9, 9, 9, 9]
-    assert {f"s{k}" for k in range(9)} <= set(legend(figure))
-    assert len({container[0].get_color() for container in figure.axes[0].containers}) == 9
 
 
 def test_only_complete_runs_are_drawn():
@@ -607,39 +530,6 @@ def many(surfaces=9, materials=1):
     return campaign_tree(runs)
 
 
-def two_surfaces(slopes=(1.0,), *, both_models=False):
-    names = ["rough-hurst0.6", "rough-hurst0.9"]
-    runs = [
-        (RunLabels("vary", "asperities", name, 1, slope, material), small.run(1 + k, slope, material).assign(seed=1))
-        for (k, name), slope, material in itertools.product(enumerate(names), slopes, ("soft", "hertz"))
-    ]
-    if both_models:
-        runs += [(labels._replace(model="boundary_elements"), compared.own_patches(run)) for labels, run in runs]
-    return names, campaign_tree(runs)
-
-
-@pytest.mark.parametrize("alone", [False, True])
-def test_fig5_legend_has_the_markers_of_boundary_elements_that_are_drawn(alone):
-    runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"]
-    crosses = [(labels._replace(model="boundary_elements"), compared.own_patches(run)) for labels, run in runs]
-    flat = min(labels.rms_slope for labels, _ in runs)
-    shown = crosses if alone else [*runs, *(pair for pair in crosses if pair[0].rms_slope == flat)]
-    figure = fig5_multi_slope.figure(campaign_tree(shown), study="slopes")
-    names = dict(zip(legend(figure), figure.legends[0].legend_handles, strict=True))
-    named = {name: names[name].get_marker() for name in names if name.startswith("boundary elements, ")}
-    assert len(set(named.values())) == len(named) == (2 if alone else 1)
-    for marker in named.values():
-        assert lines_of(figure.axes[0], marker)
-
-
-def test_curves_of_boundary_elements_can_be_told_apart():
-    _, tree = two_surfaces((1.0, 0.5, 0.2), both_models=True)
-    left, *_ = fig2_area_and_gap.figure(tree, study="vary").axes
-    lines = [line for line in left.get_lines() if line.get_marker() != "None"]
-    looks = [(line.get_marker(), line.get_color(), line.get_markerfacecolor()) for line in lines]
-    assert len(looks) == len(set(looks)) == 2 * 3 * 2 * 2, "surfaces, slopes, materials, models"
-
-
 def test_differences_end_at_the_largest_load_that_both_models_reach():
     runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"][:1]
     (labels, run), smaller = runs[0], 0.9
@@ -649,63 +539,6 @@ def test_differences_end_at_the_largest_load_that_both_models_reach():
     panels = fig2_area_and_gap.figure(campaign_tree(runs), study="slopes").axes
     drawn = [line.get_xdata() for line in panels[2].get_lines() if line.get_marker() == "o"]
     assert max(map(max, drawn)) == pytest.approx(smaller * max(small.PRESSURES))
-
-
-def test_fig5_has_a_panel_for_each_surface_and_material_with_many_slopes():
-    names, tree = two_surfaces((1.0, 0.5, 0.2, 0.1))
-    panels = fig5_multi_slope.figure(tree, study="vary").axes
-    assert [axes.get_title("right").split(",")[0] for axes in panels] == 2 * names
-    for axes in panels:
-        lines = [line for line in axes.get_lines() if len(line.get_xdata())]
-        assert len({line.get_color() for line in lines}) == len(lines) == 4
-    limits = [axes.get_ylim() for axes in panels]
-    assert limits[0] == limits[1] != limits[2] == limits[3]
-
-
-def test_fig5_distinguishes_surfaces():
-    slopes = (1.0, 0.2)
-    names, tree = two_surfaces(slopes)
-    figure = fig5_multi_slope.figure(tree, study="vary")
-    words = dict(zip(legend(figure), figure.legends[0].legend_handles, strict=True))
-    for name, slope in itertools.product(names, slopes):
-        (text,) = (text for text in words if name in text and f"{slope:g}" in text.split("=")[-1])
-        marker = words[text].get_marker()
-        drawn = lines_of(figure.axes[0], marker)
-        wanted = [small.run(1 + names.index(name), slope, material) for material in ("soft", "hertz")]
-        for line, run in zip(drawn, wanted, strict=True):
-            np.testing.assert_allclose(line.get_ydata(), path_steps(run)["contact_area_fraction"])
-    assert len(words) == 4 + 2  # two materials
-    assert [words[name].get_marker() for name in list(words)[:2]] == ["None", "None"]
-
-
-@pytest.mark.parametrize("limits", [(1.5e-4, 9e-4), (2e-4, 3e-3), (0.9e-3, 2.9e-3)])
-def test_logarithmic_axes_label_no_more_than_has_room(limits):
-    figure = new_figure(3.5, 3)
-    axes = figure.subplots()
-    logarithmic_axes(axes, "x")
-    axes.set_xlim(limits)
-    figure.canvas.draw()
-    shown = [
-        text.get_window_extent(figure.canvas.get_renderer())
-        for minor in (False, True)
-        for text in axes.get_xticklabels(minor=minor)
-        if text.get_text() and limits[0] <= text.get_position()[0] <= limits[1]
-    ]
-    shown.sort(key=lambda box: box.x0)
-    assert 1 < len(shown) < 6
-    assert all(one.x1 < two.x0 for one, two in itertools.pairwise(shown))
-
-
-def test_many_surfaces_and_many_materials_have_graded_colours():
-    figure = fig5_multi_slope.figure(many(surfaces=12), study="many")
-    assert len({line.get_color() for line in lines_of(figure.axes[0], "o")}) == 12
-    names = [name for name in legend(figure) if "hurst" in name]
-    assert len(names) == 9 and {"rough-hurst0.20", "rough-hurst0.42"} <= set(names)
-    figure = fig3_distributions.figure(many(surfaces=1, materials=12), study="many")
-    shown = [line for line in figure.axes[0].get_lines() if len(line.get_xdata())]
-    assert len({line.get_color() for line in shown} - {BLACK}) == 12
-    assert len([name for name in legend(figure) if "Delta" in name]) == 9
-    assert some_of("abc") == ["a", "b", "c"]
 
 
 def test_fig4_does_not_show_another_run_where_its_own_failed(surface):

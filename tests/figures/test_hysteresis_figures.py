@@ -17,7 +17,6 @@ from icha.figures.drawn import caption_of
 from icha.figures.ensembles import Points
 from icha.figures.fig15_loss import PARTS, fit_line, shares
 from icha.figures.select import ContactRuns, select_unloaded_runs
-from icha.figures.style import slope_label
 
 MODULES = (fig13_loops, fig14_pull_off, fig15_loss)
 NAMES = (("reduced_separation", "reduced_pressure"), ("reduced_pressure", "contact_area_fraction"))
@@ -131,38 +130,6 @@ def test_fig13_shows_one_surface_and_seed(tree):
         fig13_loops.figure(tree, study="hard", seed=7)
 
 
-def test_fig13_distinguishes_slopes_by_marks_and_many_by_panels(tree):
-    figure = fig13_loops.figure(tree, study="slopes")
-    assert len(figure.axes) == 2
-    turns = [line for line in marks(figure.axes[0]) if line.get_markeredgecolor() != "black"]
-    looks = {(line.get_marker(), line.get_markeredgecolor()) for line in turns}
-    assert len(turns) == len(looks) == 4
-    solid, _ = curves(figure.axes[0])
-    ends = {(line.get_xdata()[-1], line.get_ydata()[-1]) for line in solid}
-    assert {(line.get_xdata()[0], line.get_ydata()[0]) for line in turns} == ends
-
-    slopes, materials = (1.0, 0.5, 0.3, 0.2, 0.1), ("sticky", "weak", "hertz")
-    many = separate.tree(separate.study("one", materials, slopes, seeds=(1,)))
-    figure = fig13_loops.figure(many, study="one")
-    assert len(figure.axes) == 10
-    for k, slope in enumerate(slopes):
-        solid, dashed = curves(figure.axes[2 * k])
-        assert len(solid) == len(dashed) == len({line.get_color() for line in solid}) == 3
-        assert f"{slope:g}" in figure.axes[2 * k + 1].get_title("right")
-    assert len(legend(figure)) == 3 + 3
-
-
-def test_fig13_enlarges_tension_that_is_small():
-    run = separate.run("weak", 1.0, depth=1.5)
-    weak = separate.tree(separate.study("one", ("weak",), (1.0,), (1,), depth=1.5))
-    tension = -run["reduced_pressure"].values.min()
-    assert 0 < tension < 0.1 * run["reduced_pressure"].values.max()
-    _, enlarged, _ = fig13_loops.figure(weak, study="one").axes
-    low, high = enlarged.get_ylim()
-    assert low < -tension and high < 0.25 * float(run["largest_reduced_pressure"]) and len(marks(enlarged)) == 1
-    assert len(fig13_loops.figure(one(), study="one").axes) == 2
-
-
 @pytest.mark.parametrize(
     ("name", "markers"), [("boundary elements", ["+", "x"]), ("boundary elements at finite range", ["1", "2"])]
 )
@@ -242,40 +209,6 @@ def test_captions_name_the_models_that_are_drawn(module):
     assert not [text for text in (alone, truth) if "Crosses" in text or "causes are those of the asperity" in text]
 
 
-def test_fig14_shows_the_slope_zero_of_a_smooth_shape():
-    runs = separate.study("one", slopes=(1.0, 0.1), materials=("sticky",), seeds=(1,))
-    runs = [(labels._replace(rms_slope=labels.rms_slope - 0.1), run) for labels, run in runs]
-    (axes,) = fig14_pull_off.figure(separate.tree(runs), study="one").axes
-    assert axes.get_xscale() == "linear" and axes.get_xlim()[0] < 0
-
-
-def test_fig14_shows_zero_and_values_that_span_decades():
-    slopes = (1.0, 0.5, 0.2, 0.1)
-    many = separate.tree(separate.study("one", slopes=slopes, materials=("sticky", "weak", "hertz"), seeds=(1,)))
-    (axes,) = fig14_pull_off.figure(many, study="one").axes
-    values = np.concatenate([container[0].get_ydata() for container in axes.containers])
-    positive = values[values > 0]
-    assert positive.max() > 100 * positive.min() and axes.get_yscale() == "symlog"
-    low, high = axes.get_ylim()
-    assert low < 0 and high > positive.max()
-    # The smallest of them stands apart from zero.
-    heights = axes.transData.transform([(1, 0), (1, positive.min())])[:, 1] / axes.bbox.height
-    assert np.diff(heights) > 0.03
-    assert [f"{tick:g}" for tick in axes.get_xticks()] == ["0.1", "0.2", "0.5", "1"]
-    for container in axes.containers[:2]:
-        assert np.all(np.diff(container[0].get_ydata()) < 0), "rougher surfaces stick less"
-    (alone,) = fig14_pull_off.figure(one("hertz"), study="one").axes
-    assert alone.containers[0][0].get_ydata().tolist() == [0]
-
-
-def test_fig14_distinguishes_slopes_of_the_loads(tree):
-    figure = fig14_pull_off.figure(tree, study="slopes", load_studies=["slopes", "gentle"])
-    looks = {(each[0].get_color(), each[0].get_marker()) for each in figure.axes[1].containers}
-    assert len(figure.axes[1].containers) == len(looks) == 4
-    # Materials, slopes, and the seeds.
-    assert len(legend(figure)) == 2 + 2 + 1
-
-
 def test_a_straight_line_and_a_power_law_are_found_exactly():
     x = np.array([0.01, 0.03, 0.04, 0.1])
     values, r_squared, _ = fit_line(x, 0.7 * x - 0.002, np.array([0.0, 1.0]))
@@ -341,13 +274,6 @@ def test_points_of_a_line_are_means_over_the_seeds_that_all_have():
     assert line.means.tolist() == [[1, 3], [4, 20]]
     apart = points({1: (2.0, 10.0)}, {2: (3.0, 8.0)})
     assert not apart.same_seeds and apart.means[1].tolist() == [10, 8]
-
-
-def test_fig15_names_the_slope_below_each_bar():
-    slopes = (0.5, 0.3)
-    tree = separate.tree(separate.study("one", slopes=slopes))
-    words = [label.get_text() for label in fig15_loss.figure(tree, studies=["one"]).axes[1].get_xticklabels()]
-    assert sorted(words) == sorted(slope_label(slope) for slope in slopes)
 
 
 def test_fig15_needs_adhesion():

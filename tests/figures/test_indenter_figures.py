@@ -211,15 +211,6 @@ def test_maps_show_the_pressure_at_every_snapshot():
         assert shown.sum() * unit * (SIDE / GRID) ** 2 == pytest.approx(force, rel=1e-4)
 
 
-def test_five_snapshots_leave_one_place_empty():
-    pressures = [1e-3, 2e-3, 5e-3, 1e-2, 2e-2]
-    path = icha.Path(reduced_pressures=pressures, snapshots=[("reduced_pressure", p) for p in pressures])
-    surface = icha.SelfAffineSpectrum(1e-4, 5e-5, 2e-5, 0.8, 0.1).realise(48, 1)
-    run = icha.simulate(surface, icha.Material(MODULUS, 0.0), path, model="boundary_elements")
-    fig = fig20_pressure_maps.figure(tree_of(run), run, run=("press", "boundary_elements", "s0", 0, 0.1, "soft"))
-    assert len([ax for ax in fig.axes if ax.get_images()]) == 5
-
-
 def test_reasons_for_an_empty_figure():
     bare = tree_of(press(energy=0.0))
     fig17_force_indentation.figure(bare, study="press")
