@@ -40,8 +40,11 @@ _LINE = {"lw": 0.9, "ls": "-"}
 _TRUTH = {name: TRUTH_LINE[name] for name in ("lw", "ls")}
 # Oblique crosses can be told from bars.
 _OBLIQUE = UNLOADING_MARKERS[REFERENCE_NAME]
-# Points at the same slope or load are drawn side by side. The last and the first of many lines have nearly this ratio.
-_SPREAD = 1.15
+# Points at the same slope or load are drawn side by side. The last and the first of many lines have nearly this ratio,
+# or the root of the ratio of the closest different values; values count as the same up to the second ratio.
+_SPREAD, _SAME = 1.15, 1.001
+# A slope has a tick if its ratio to the next smaller slope is at least this number.
+_APART = 1.06
 # Size of the markers, divided by the usual size, so that short bars are visible.
 _SMALLER = 0.7
 # Variable on the y axis.
@@ -72,13 +75,14 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
     counts = []
     for ax, x, drawn in zip(panels, ("rms_slope", "largest_reduced_pressure"), (by_slope, by_load), strict=False):
         lines = {key: Points(line, x, _Y, factor=factor) for key, line in drawn.items()}
+        spread = _spread([line.means[0] for line in lines.values()])
         for position, ((contact, applicable, model), line) in enumerate(lines.items()):
             look = looks.look(contact, applicable=applicable, model=model) | _LINE
             if len(models) > 1 and model == REFERENCE_MODEL:
                 look = cross_look(looks, contact, shape=_OBLIQUE) | _TRUTH
                 look = look if applicable else pale(look, model)
             look["ms"] *= _SMALLER
-            line.draw(ax, look, shift=_SPREAD ** ((position + 0.5) / len(lines) - 0.5))
+            line.draw(ax, look, shift=spread ** ((position + 0.5) / len(lines) - 0.5))
             counts += line.counts
         loads, values = np.concatenate([line.means for line in lines.values()], axis=1)
         _scale(ax, values)
@@ -88,7 +92,8 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
     panels[0].set(xlabel=label_of("rms_slope"), xscale=scale)
     room = 0.25 * (slopes[-1] or 1)  # a smooth shape has the slope 0
     panels[0].set_xlim(slopes[0] / 1.25 if slopes[0] else -room, slopes[-1] + room)
-    panels[0].set_xticks(slopes, [f"{slope:.4g}" for slope in slopes])
+    ticks = [slope for k, slope in enumerate(slopes) if not k or slope > _APART * slopes[k - 1]]
+    panels[0].set_xticks(ticks, [f"{slope:.4g}" for slope in ticks])
     panels[0].xaxis.minorticks_off()
     if by_load:
         panels[1].set_xlabel(label_of("largest_reduced_pressure"))
@@ -146,3 +151,10 @@ def _scale(ax, values):
     elif len(positive):
         ax.set_ylim(bottom=-0.04 * positive.max())
     ax.axhline(0, color=GREY, lw=0.6, zorder=1)
+
+
+def _spread(positions):
+    """Return the ratio of the last and the first of points side by side, so that points keep their order."""
+    values = np.unique(np.concatenate(positions))
+    ratios = values[1:] / values[:-1] if values.size and values[0] > 0 else np.empty(0)
+    return min([_SPREAD, *np.sqrt(ratios[ratios > _SAME])])
