@@ -9,10 +9,10 @@ from icha import Material, Path, SelfAffineSpectrum, Surface
 from icha.boundary_elements.contact import contact_of
 from icha.contact.model import JUMP_IN, JUMP_OFF
 from icha.path.follow import follow
-from icha.references.indentation import elliptic_pull_off
 from icha.surfaces.shapes import Paraboloid, Sphere
 from validation import indenter_contacts as contacts
 from validation import rough_indenters
+from validation.elliptic_contacts import elliptic_pull_off
 from validation.single_contacts import largest_tension
 
 

@@ -28,7 +28,9 @@ from icha.configuration.cases import run_cases
 from icha.configuration.load import load_configuration
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import read_campaign, write_dataset
+from icha.datasets.results import FIGURE_ENDINGS
 from icha.datasets.table import as_csv, tidy_table
+from icha.figures.registry import draw_figure
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -190,6 +192,10 @@ def with_results(folder):
     ((_, measured), *_) = campaigns(DOCS / "howto/measured_campaign.md")
     measured["studies"]["ensemble"]["seeds"] = [1, 2]
     write_results(folder, loaded(folder, measured))
+    figure = [folder / f"results/mine/figures/fig2_area_and_gap.{ending}" for ending in FIGURE_ENDINGS]
+    figure[0].parent.mkdir()
+    inputs = {"campaign": str(folder / "results/mine/dataset/mine.nc")}
+    draw_figure("fig2_area_and_gap", *figure, inputs=inputs, arguments={"study": "load"})
     table = as_csv(tidy_table(read_campaign(folder / "results/mine/dataset/mine.nc")))
     (folder / "results/mine/dataset/mine.csv").write_text(table, encoding="utf-8")
     answers = estimate_campaign(compared.tree_of_both())["one"].to_dataset()
