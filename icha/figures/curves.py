@@ -164,6 +164,14 @@ def snapshot_looks(campaign: xr.DataTree, study: str, lines: Sequence[select.Sna
     return [looks.look(group.contact, applicable=group.applicable) | shape for group in groups], looks
 
 
+def _topographies(counts):
+    """Return words for the topographies of boundary elements; `counts` has the seeds of both models, for each curve."""
+    if fewer := sorted({truths for asperities, truths in counts if truths != asperities}):
+        seeds = " or ".join(map(str, fewer))
+        return f"on {seeds} of the topographies alone, so their means also differ by the seeds"
+    return "on the same topographies"
+
+
 def say_snapshot_models(figure: Figure, lines: Sequence[select.Snapshots], beside: str) -> None:
     """Explain the lines of the models in a figure of one snapshot; `beside` names the lines beside asperities."""
     model = lines[0].runs.model_name
@@ -174,7 +182,8 @@ def say_snapshot_models(figure: Figure, lines: Sequence[select.Snapshots], besid
     else:
         say(figure, "Solid lines with crosses are results of boundary elements.")
     if any(line.truths for line in lines):
-        say(figure, f"{beside} are boundary elements, on the same topographies.")
+        counts = [(len(line.members), len(line.truths)) for line in lines if line.truths]
+        say(figure, f"{beside} are boundary elements, {_topographies(counts)}.")
     runs = (run for line in lines for run, _ in (*line.members, *line.truths))
     say(figure, range_of_attraction(attractions_of(runs)))
 
@@ -338,7 +347,9 @@ def say_models(figure: Figure, curves: Curves, where: str = "", *, stars: str = 
         say(figure, f"{shapes} are the asperity model{where}.")
     if REFERENCE_NAME in models:
         shapes = stars if several[REFERENCE_NAME] else "Crosses"
-        beside = ", on the same topographies" if curves.crosses else ""
+        of_asperities = {curve.runs.contact: len(curve.runs.by_seed) for curve in curves.lines}
+        counts = [(of_asperities.get(curve.runs.contact, 0), len(curve.runs.by_seed)) for curve in curves.crosses]
+        beside = f", {_topographies(counts)}" if counts else ""
         say(figure, f"{shapes} are boundary elements{where}{beside}.")
     if select.FINITE_RANGE_NAME in models:
         say(figure, f"Crosses with three arms are boundary elements at a finite range{where}.")
