@@ -92,7 +92,7 @@ VALIDATED = {
 def outside_validation(facts: Mapping[str, float]) -> list[str]:
     """Describe each quantity outside the range of the validation; `facts` are values by key of `VALIDATED`."""
     return [
-        f"{words} {facts[name]:.2g}, validated: {least:g} {'and more' if most == math.inf else f'to {most:g}'}"
+        f"{words} {facts[name]:.4g}, validated: {least:g} {'and more' if most == math.inf else f'to {most:g}'}"
         for name, (words, least, most) in VALIDATED.items()
         if name in facts and not least <= facts[name] <= most
     ]
@@ -199,6 +199,8 @@ def _full_contact(cases):
     limit = largest_area_fraction(min(ratios, default=math.inf))
     if limit < MAX_AREA_FRACTION:
         text += f"; the asperity model is applicable up to the contact area A/A0 = {limit:.2g}"
+    if any(case.facts.get(SHAPED) for case in cases):
+        text += "; surfaces with a shape are left out"
     yield Statement("adhesion", text, lowest.ratio >= HIGH_PULL_OFF_BELOW and limit >= MAX_AREA_FRACTION)
 
 

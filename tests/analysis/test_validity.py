@@ -91,7 +91,7 @@ def test_no_accuracy_is_quoted_of_surfaces_outside_the_validation(name, value, r
 def test_sticky_materials_are_named():
     sticky = {**INSIDE, "full_contact_energy_ratio": 0.138}
     found = told({}, [case(sticky, material="pdms"), case(INSIDE), case(sticky, model="boundary_elements")])
-    assert "(pdms on rough: U_full/dgamma 0.14, validated: 76 and more)" in found["accuracy"][0]
+    assert "(pdms on rough: U_full/dgamma 0.138, validated: 76 and more)" in found["accuracy"][0]
     text, good = found["adhesion"]
     assert not good and "about 0.138 or more (pdms on rough)" in text
     assert text.endswith("the asperity model is applicable up to the contact area A/A0 = 0.0028")
