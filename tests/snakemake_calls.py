@@ -11,8 +11,8 @@ _server = multiprocessing.get_context("forkserver")
 _server.set_forkserver_preload(["snakemake.cli", "xarray", "h5netcdf", "pydantic", "jinja2", "scipy.stats"])
 
 
-def call_snakemake(project: Path, arguments: list[str], environment: dict[str, str], output: Path) -> int:
-    """Call Snakemake with the modules of a copy of the project; return its exit code. `output` receives its output."""
+def call_snakemake(project: Path, arguments: list[str], environment: dict[str, str], output: str) -> int:
+    """Call Snakemake with the modules of a copy of the project; return its exit code; `output` is a file."""
     call = _server.Process(target=_call, args=(project, arguments, environment, output))
     call.start()
     call.join()

@@ -39,8 +39,7 @@ def asperity_applicability(
     contact_area_fraction : largest contact area fraction A/A0 of the run.
     reduced_gap : smallest mean gap of the run, divided by the rms height.
     """
-    reasons, ratio = [], f"U_full/dgamma = {full_contact_energy_ratio:.3g}"
-    reasons += summit_reasons
+    reasons, ratio = list(summit_reasons), f"U_full/dgamma = {full_contact_energy_ratio:.3g}"
     limit = largest_area_fraction(full_contact_energy_ratio)
     if contact_area_fraction > limit:
         reasons.append(

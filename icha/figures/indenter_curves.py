@@ -56,7 +56,7 @@ def select_series(campaign: xr.DataTree, study: str, *, only_jkr: bool = False) 
     NothingToDraw
         If no run is complete and unloads, if no run is on a free square, or if all runs are left out.
     """
-    # The asperity model is usually not applicable to conformal contact.
+    # Only boundary elements compute shapes; both models compute free squares without a shape.
     unloaded = select.select_unloaded_runs(campaign, study, REFERENCE_MODEL)
     runs = [(labels, run) for labels, run in unloaded if "force" in run]
     if not runs:
