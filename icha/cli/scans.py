@@ -23,8 +23,19 @@ MOST_FILLED = 0.05
 # if the ratio of rms slopes is larger than this value.
 MUCH_CURVATURE, ANISOTROPIC = 0.5, 1.5
 # A file may lack these keys. ICHA then assumes the values of GUESSES (in m), and shows those of EXAMPLES to the user.
-GUESSES = {"height_unit": 1e-9, "lateral_unit": 1e-6, "size": (1e-4, 1e-4), "scattered": "interpolate"}
+GUESSES = {
+    "height_unit": 1e-9,
+    "lateral_unit": 1e-6,
+    "size": (1e-4, 1e-4),
+    "scattered": "interpolate",
+    "touches_first": "low",
+}
 EXAMPLES = {"height_unit": "nm", "lateral_unit": "um", "size": "[90 um, 90 um]", "scattered": "interpolate"}
+# What the user can do about keys that ICHA cannot assume.
+_HINTS = {
+    "data": "; choose one with --data NAME",
+    "columns": "; write x, y and z above these columns in the file, and the unit of each column, such as z (nm)",
+}
 # Lines of a text file, and characters of a line, that `icha new` prints.
 SHOWN_LINES, SHOWN_WIDTH = 6, 72
 
@@ -176,6 +187,7 @@ def read_measured_section(path: Path, data: str | None, folder: Path) -> dict[st
     name : name of the surface.
     path : file of the topography, relative to `folder`.
     lines : lines of YAML, with the keys that the file determines and the keys that the user fills in.
+    touches_first : `low` if the heading of the file says that the numbers increase downwards; otherwise `high`.
     to_fill_in : keys that the user must fill in, each with the reason.
     advice : recommended keys, with their values as text.
     scan : resolution of the scan (`icha.surfaces.measured.resolution.ScanResolution`).
@@ -200,6 +212,8 @@ def read_measured_section(path: Path, data: str | None, folder: Path) -> dict[st
     except UnfitTopography as error:
         raise UserError(f"--measured {path}: {error.key} {error}") from None
 
+    # A heading that says that the numbers increase downwards determines this key.
+    missing.pop("touches_first", None)
     array = data if data is not None else scan.data
     lines = [f"data: {json.dumps(array)}"] if array else []
     points = f"# {columns} x {rows} points"
@@ -219,6 +233,7 @@ def read_measured_section(path: Path, data: str | None, folder: Path) -> dict[st
     missing["boundary"] = "what surrounds the scan: free, window, mirror or periodic"
     relative = Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
     section = {"name": name, "path": relative, "lines": lines}
+    section["touches_first"] = guessed.get("touches_first", "high")
     return section | {"to_fill_in": missing, "advice": advice, "scan": resolution}
 
 
@@ -235,8 +250,7 @@ def _load(path: Path, data: str | None):
             break
         except UnfitTopography as error:
             if error.key not in GUESSES or error.key in guessed:
-                hint = "; choose one with --data NAME" if error.key == "data" else ""
-                raise UserError(f"--measured {path}: {error.key} {error}{hint}") from None
+                raise UserError(f"--measured {path}: {error.key} {error}{_HINTS.get(error.key, '')}") from None
             guessed[error.key] = GUESSES[error.key]
             missing[error.key] = str(error)
     if "size" in missing:

@@ -221,6 +221,10 @@ def test_a_text_is_shown_and_what_is_missing_is_asked(project):
     )
     assert "numbered.csv begins with:\n  0,1,2,3" in output("new", "two", "--measured", "numbered.csv", status=2)
     assert "first row of numbers, 1, 2, 3" in printed("new", "two", "--measured", "numbered.csv", status=2)
+    # A heading that says that numbers increase downwards.
+    Path("down.txt").write_text("\n".join(["Z axis: down", "Unit: nm", *rows]))
+    assert "touches_first (" not in output("new", "down", "--measured", "down.txt")
+    assert yaml.safe_load((CAMPAIGNS / "down.yaml").read_text())["surfaces"]["down"]["touches_first"] == "low"
     # Missing points of a grid, and points on no grid.
     y, x = np.mgrid[:24, :24] * 0.5
     table = np.column_stack([x.ravel(), y.ravel(), rough_heights()[:24, :24].ravel() * 1e9])
