@@ -33,7 +33,7 @@ SURFACES = ((0.3, 2), (0.3, 4), (0.5, 2), (0.5, 4), (0.8, 2), (0.8, 4), (0.8, 6)
 RATIOS = {"bare": math.inf, "weak": 100.0, "medium": 20.0, "sticky": 3.0}
 PRESSURES = (1e-3, 3e-3, 1e-2, 3e-2)
 QUANTITIES = {"contact area": "contact_area_fraction", "mean gap": "mean_gap", "stiffness": "contact_stiffness"}
-LOOP_QUANTITIES = {"pull-off tension": "pull_off_pressure", "loss": "hysteresis_loss"}
+LOOP_QUANTITIES = {"pull-off pressure": "pull_off_pressure", "loss": "hysteresis_loss"}
 LOOP_SURFACES, LOOP_RATIOS = ((0.5, 4), (0.8, 2), (0.8, 4)), ("weak", "medium")
 # Models and grids of the levels; sticky surfaces have no asperity level.
 LEVELS = {

@@ -5,6 +5,7 @@
 
 import json
 import re
+import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -38,8 +39,10 @@ def key_tables() -> str:
     places: dict[str, list[str]] = {}
     for name, place in _sections(schema, schema, ""):
         places.setdefault(name, []).append(place)
-    tables = [_table(", ".join(dict.fromkeys(places[name])), schema["$defs"][name]) for name in places]
-    return "\n".join([_table("Top level", schema), *tables])
+    known: set[tuple[str, str]] = set()
+    top = _table("Top level", schema, known)
+    tables = [_table(", ".join(dict.fromkeys(places[name])), schema["$defs"][name], known) for name in places]
+    return "\n".join([top, *tables])
 
 
 def _sections(section: dict, schema: dict, place: str) -> Iterator[tuple[str, str]]:
@@ -55,15 +58,25 @@ def _sections(section: dict, schema: dict, place: str) -> Iterator[tuple[str, st
             yield from _sections(inner, schema, f"{where}.")
 
 
-def _table(heading: str, section: dict) -> str:
+def _table(heading: str, section: dict, known: set[tuple[str, str]]) -> str:
+    """Return the table of one section; optional keys that an earlier table describes are only named."""
     required = section.get("required", [])
-    lines = [f"### {heading}", "", section.get("description", ""), "", "| key | default | meaning |", "|---|---|---|"]
+    rows, repeated = [], []
     for key, value in section["properties"].items():
         default = value.get("default")
+        if default is None and key not in required and (key, value["description"]) in known:
+            repeated.append(f"`{key}`")
+            continue
+        known.add((key, value["description"]))
         # If the default is a section, the section may be missing from the file.
         shown = "none" if default is None or isinstance(default, dict) else f"`{json.dumps(default)}`"
-        lines.append(f"| `{key}` | {'required' if key in required else shown} | {value['description']} |")
-    return "\n".join([*lines, ""])
+        rows.append(f"| `{key}` | {'required' if key in required else shown} | {value['description']} |")
+    lines = [f"### {heading}", "", section.get("description", ""), ""]
+    if rows:
+        lines += ["| key | default | meaning |", "|---|---|---|", *rows, ""]
+    if repeated:
+        lines += [*textwrap.wrap(f"Keys with the meaning given above: {', '.join(repeated)}.", 120), ""]
+    return "\n".join(lines)
 
 
 def readme_with_tables(text: str) -> str:
