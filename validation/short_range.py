@@ -223,7 +223,7 @@ _SAME = {"pressure_error": ("load", ".2g"), "area_error": ("area", ".2g")}
 _SAME |= {"fraction_error": ("largest difference of a cell", ".2g")}
 _JUMP_IN = {"approach": ("approach", ".6g"), "approach_exact": ("Wu", ".6g")}
 _JUMP_IN |= {"spots_before": ("spots before", "g"), "spots_after": ("after", "g")}
-_WAVE = {"alpha": ("α", "g"), "grid": ("grid", "g"), "branch": ("branch", "s"), "psi": ("ψ", "g")}
+_WAVE = {"alpha": ("α", "g"), "grid": ("grid", "g"), "psi": ("ψ", "g")}
 _WAVE |= {"cells": ("half-width in cells", ".3g"), "width_error": ("width", "%"), "pressure": ("p/p\\*", ".4g")}
 _WAVE |= {"pressure_exact": ("exact", ".4g"), "pressure_error": ("pressure", "%"), "energy_error": ("energy", "%")}
 _LOOP = {"with": ("adhesion", "s"), "step": ("longest step/h_rms", "g"), "steps": ("equilibria", "g")}
@@ -259,12 +259,6 @@ _BY_ROW = {
     "pair": (
         "pair",
         _GRID | {"approach": ("approach", "g"), "spots": ("patches", "g"), "asymmetry": ("asymmetry", ".2g")} | _ERRORS,
-    ),
-    "tamaas": (
-        "tamaas",
-        _GRID
-        | {"reduced_pressure": ("p\\*", "g"), "separation_error": ("mean gap", "%")}
-        | {"gap_error": ("gap, rms over h_rms", "%"), "area_error": ("area", "%")},
     ),
     "loops": ("loops", _LOOP),
     "symmetry": ("symmetry", {"what": ("the same surface", "s")} | _SAME),

@@ -55,13 +55,16 @@ def means(values: Sequence[np.ndarray], form: str) -> list[str]:
 
 
 def by(rows: Sequence[Mapping], columns: Mapping[str, tuple[str, str]]) -> Table:
-    """Table with a line for each row; columns give heading and format, `%` for errors in per cent."""
+    """Table with a line for each row; columns give heading and format, `%` for errors in per cent.
+
+    A line that repeats an earlier one, such as a state of loading and of unloading, is left out.
+    """
 
     def written(value, form):
         return percent(value) if form == "%" else format(value, form)
 
-    lines = [[written(row[name], form) for name, (_, form) in columns.items()] for row in rows]
-    return Table([heading for heading, _ in columns.values()], lines)
+    lines = dict.fromkeys(tuple(written(row[name], form) for name, (_, form) in columns.items()) for row in rows)
+    return Table([heading for heading, _ in columns.values()], [list(line) for line in lines])
 
 
 def pressures(values: np.ndarray) -> list[str]:

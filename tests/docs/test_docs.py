@@ -111,8 +111,7 @@ def folder(tmp_path_factory):
     write_data(folder / "config/data")
     shutil.copytree(ROOT / "config/topographies", folder / "config/topographies")
     (folder / "config/campaigns").mkdir()
-    (drawing,) = (block for _, block in blocks(DOCS / "howto/gallery.md", "python") if "def draw" in block)
-    (folder / "config/campaigns/spots.py").write_text(drawing, encoding="utf-8")
+    shutil.copyfile(DOCS / "examples/own_figure.py", folder / "config/campaigns/own_figure.py")
     return folder
 
 
