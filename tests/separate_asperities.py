@@ -121,6 +121,7 @@ class Asperities:
             "dissipated_by_jump_off": jump_off,
             "dissipated_by_coalescence": 0 * u,
             "dissipated_by_load_jump": 0 * u,
+            "dissipated_by_front": 0 * u,
             **counts,
         }
         per_event = {

@@ -53,6 +53,9 @@ PARTS: dict[str, Callable] = {
     "balance": lambda: _rows(rough.conformal_sphere, [(0.05, 1), (0.1, 2), (0.15, 3), (0.2, 4), (0.3, 5)]),
     "convergence": lambda: _rows(rough.rough_loop, [(64,), (128,), (256,)]),
     "smooth_loop": lambda: [rough.smooth_loop()],
+    "direction": lambda: _rows(
+        rough.directed_sphere, [(1 / 4, 3, 3.0), (1 / 5, 3, 3.0), (1 / 4, 10, 3.0), (1 / 5, 10, 3.0), (1 / 4, 10, 4.0)]
+    ),
 }
 
 
@@ -156,6 +159,11 @@ _BALANCE |= {"loading_law": ("loading, law", ".3f"), "unloading_law": ("unloadin
 _BALANCE |= {"loading_contact_radius": ("loading, a³", ".3f"), "loading_indentation": ("loading, δ", ".3f")}
 _BALANCE |= {"unloading_contact_radius": ("unloading, a³", ".3f"), "unloading_indentation": ("unloading, δ", ".3f")}
 _BALANCE |= {"pull_off": ("pull-off", ".3f"), "loss_over_area": ("loss/(Δγ A)", ".3f")}
+_DIRECTION = {"ratio": ("ratio of works", "g"), "cells": ("cells in the radius", ".3g"), "kind": ("pull-off of", "s")}
+_DIRECTION |= {"advancing": ("advancing work", ".1%"), "standing": ("standing radius", ".1%")}
+_DIRECTION |= {"stiffness": ("stiffness 2E*a", ".1%"), "receding": ("receding work", ".1%")}
+_DIRECTION |= {"pull_off": ("pull-off", "%"), "front": ("front dissipation", "%")}
+_DIRECTION |= {"unattributed": ("unattributed loss", ".2%")}
 _GRID = {"grid": ("grid", "g"), "wave_cells": ("cells in the shortest wave", "g"), "steps": ("equilibria", "g")}
 _GRID |= {"pull_off": ("pull-off", ".4f"), "loss": ("loss", ".3f"), "largest_area": ("largest area", ".3f")}
 _GRID |= {"seconds": ("time in s", ".1f")}
@@ -201,6 +209,7 @@ def tables(rows: dict[str, list[dict]]) -> dict[str, Table]:
         "layer_limits": by(rows["layer_limits"], _LIMITS | {"force_error": ("force", "%")}),
         "balance": by(rows["balance"], _BALANCE),
         "convergence": by(rows["convergence"], _GRID),
+        "direction": by(rows["direction"], _DIRECTION),
     }
     return {f"indenter_{name}": table for name, table in found.items()} | {"benchmarks_indenter": cost(rows)}
 

@@ -19,6 +19,7 @@ from icha import Material, Path, SelfAffineSpectrum, Surface, simulate
 from icha.boundary_elements.contact import contact_of
 from icha.boundary_elements.elastic import wave_numbers
 from icha.half_space.layer import Layer, layer_compliance
+from icha.references.indentation import sphere_contact, sphere_pull_off
 from icha.references.jkr_fits import fit_work_of_adhesion
 from icha.surfaces.shapes import Paraboloid
 from validation.indenter_contacts import ADHESIVE, BARE, PULL_OFF
@@ -94,6 +95,38 @@ def smooth_loop(grid: int = 96) -> dict:
     run = follow(surface, ADHESIVE, 4.0)
     pull_off = -float(run.nominal_pressure.min()) * surface.period**2 / PULL_OFF
     return {"grid": grid, "steps": run.sizes["step"], "seconds": time.process_time() - clock, "pull_off": pull_off}
+
+
+def directed_sphere(spacing: float, ratio: float, radius: float, grid: int = 64) -> dict:
+    """Return the errors of a loop of a smooth sphere whose front recedes at a larger work of adhesion than it advances.
+
+    Without load, the front would advance to a radius of about 1.8. The largest tension is that of JKR with the receding
+    work or, if the contact is smaller than there, that of a punch of the largest radius.
+
+    spacing, ratio, radius : cell size, receding over advancing work, and contact radius at the largest load.
+    """
+    surface = Surface(np.zeros((grid, grid)), grid * spacing, "free", Paraboloid((1.0, 1.0)))
+    run = follow(surface, Material(1.0, (1.0, ratio), 0.2), float(sphere_contact(radius, 1.0, 1.0, 1.0).indentation))
+    area = run.contact_area_fraction.values * surface.period**2
+    a, force, turn = np.sqrt(area / math.pi), run.force.values, int(np.argmax(area))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rate = (4 / 3 * a**3 - force) ** 2 / (8 * math.pi * a**3)
+    loads, stands = slice(1, turn + 1), (run.leg == 1).values & (rate > 1.1) & (rate < 0.5 * (1 + ratio))
+    recedes = (run.leg == 1).values & (a < 0.97 * a[turn]) & (a > 0.7 * a[turn])
+    largest = -float(sphere_contact(min(a[turn], sphere_pull_off(1.0, 1.0, ratio).contact_radius), 1.0, 1.0, ratio).force)
+    front = (ratio - 1) * area[turn] / surface.period**2
+    return {
+        "ratio": ratio,
+        "cells": a[turn] / spacing,
+        "kind": "JKR" if sphere_pull_off(1.0, 1.0, ratio).contact_radius < a[turn] else "punch",
+        "advancing": float(np.abs(rate[loads] - 1).max()),
+        "standing": float(np.abs(a[stands] / a[turn] - 1).max()),
+        "stiffness": float(np.abs(run.stiffness.values[stands] / (2 * a[turn]) - 1).max()),
+        "receding": float(np.abs(rate[recedes] / ratio - 1).max()) if recedes.any() else math.nan,
+        "pull_off": float(run.pull_off_force) / largest - 1,
+        "front": float(run.front_dissipation) / front - 1,
+        "unattributed": float(abs(run.loss_unattributed) / run.hysteresis_loss),
+    }
 
 
 def conformal_sphere(energy: float, seed: int, grid: int = 128) -> dict:

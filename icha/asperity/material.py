@@ -1,7 +1,7 @@
 """Material of a contact: composite modulus, work of adhesion, range of attraction, and size of flaws."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,12 +25,15 @@ class Material:
     ----------
     contact_modulus : E*, composite elastic modulus, Pa, in [1e-9, 1e15].
     surface_energy : work of adhesion dgamma (gamma in the paper), J/m^2, at most 1e24; zero without adhesion.
-        With adhesion, surface_energy/contact_modulus must be in [1e-40, 1e9] m.
+        With adhesion, surface_energy/contact_modulus must be in [1e-40, 1e9] m. A pair gives the work of advancing and
+        that of receding fronts; the attribute is then the first, and `receding_energy` the second.
     interaction_range : range of the attractive forces (epsilon in eq. 3 of Violano & Afferrante), m, in [1e-24, 1e9].
         Default: 0.5 nm, about the distance between molecules, as for van der Waals forces.
     flaw_radius : radius of the largest flaw of the interface, m, in [1e-24, 1e9]; 0 for an interface without flaws.
     thickness : thickness of an elastic layer on a rigid base, m, in [1e-24, 1e9]; infinite for a half-space.
     poisson_ratio : Poisson ratio of the layer, in [0, 0.5]; a half-space does not depend on it at a given E*.
+    receding_energy : work of adhesion of receding fronts, J/m^2, larger than `surface_energy`; None for one value.
+        Two equal values are one value.
 
     Raises
     ------
@@ -44,9 +47,14 @@ class Material:
     flaw_radius: float = 0.0
     thickness: float = math.inf
     poisson_ratio: float = 0.5
+    receding_energy: float | None = None
 
     def __post_init__(self):
         """Check the values."""
+        if isinstance(self.surface_energy, (tuple, list)):
+            self._set_pair()
+        if self.receding_energy == self.surface_energy:
+            object.__setattr__(self, "receding_energy", None)
         rules = {"contact_modulus": CONTACT_MODULUS, "surface_energy": SURFACE_ENERGY, "interaction_range": LENGTH}
         rules |= {"flaw_radius": LENGTH} if self.flaw_radius != 0 else {}
         rules |= {"thickness": LENGTH} if self.layered else {}
@@ -55,12 +63,33 @@ class Material:
             object.__setattr__(self, name, rule.validate(name, getattr(self, name)))
         if self.surface_energy:
             ADHESION_LENGTH.validate("surface_energy over contact_modulus", self.adhesion_length)
+        if self.receding_energy is not None:
+            self._check_receding()
+
+    def _set_pair(self):
+        """Set the works of adhesion from a pair of advancing and receding values."""
+        if len(self.surface_energy) != 2 or self.receding_energy is not None:
+            raise ValueError(f"surface_energy: {self.surface_energy!r} must be a number, or a pair (advancing, receding)")
+        advancing, receding = self.surface_energy
+        object.__setattr__(self, "surface_energy", advancing)
+        object.__setattr__(self, "receding_energy", receding)
+
+    def _check_receding(self):
+        """Check that fronts recede at a larger work of adhesion than they advance."""
+        receding = SURFACE_ENERGY.validate("receding surface_energy", self.receding_energy)
+        object.__setattr__(self, "receding_energy", receding)
+        if not 0 < self.surface_energy < receding:
+            raise ValueError(
+                f"surface_energy: the advancing value {self.surface_energy:g} J/m^2 must be positive, and smaller than "
+                f"the receding value {receding:g} J/m^2"
+            )
 
     def _repr_html_(self) -> str:
         """Return a table for notebooks."""
         rows = {
             "contact modulus": format_quantity(self.contact_modulus, "Pa"),
             "work of adhesion": format_quantity(self.surface_energy, "J/m²"),
+            **({"receding": format_quantity(self.receding_energy, "J/m²")} if self.receding_energy else {}),
             "range of attraction": format_quantity(self.interaction_range, "m"),
         }
         if self.layered:
@@ -71,6 +100,17 @@ class Material:
     def layered(self) -> bool:
         """True for a layer of finite thickness."""
         return self.thickness != math.inf
+
+    @property
+    def directed(self) -> bool:
+        """True if receding fronts have a larger work of adhesion than advancing ones."""
+        return self.receding_energy is not None
+
+    @property
+    def receding(self) -> "Material":
+        """The material with the work of adhesion of receding fronts for both directions."""
+        receding = self.receding_energy
+        return self if receding is None else replace(self, surface_energy=receding, receding_energy=None)
 
     @property
     def adhesion_length(self) -> float:

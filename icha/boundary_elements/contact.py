@@ -50,8 +50,9 @@ _LONGEST, _SAME_SEPARATION, _ZERO_LOAD = 0.1, 1e-13, 1e-2
 _GAP_ERROR = 5e-9
 # Distance of untouched surfaces over the range of attraction: a little more, so that rounding leaves no attraction.
 _BEYOND_REACH = 1 + 1e-6
-# Largest relative error of the rates of a state.
-_RATE_ERROR = MODELS[REFERENCE_MODEL].stiffness_error
+# Largest relative residual of the rates of a state. Where fronts stand, their bonds are stiff springs, and the error is
+# some hundred times the residual.
+_RATE_ERROR, _RATE_ERROR_OF_SPRINGS = MODELS[REFERENCE_MODEL].stiffness_error, 1e-6
 # Least energy to which errors of the work in a loop are relative, in units of `surface_energy` times A0.
 _SMALLEST_WORK = 1e-3
 
@@ -129,8 +130,12 @@ class BoundaryElements(FullContactProblem):
 
     def continue_from(self, state: CellState, before: CellState) -> CellState:
         """Return a state with the history of the state `before` and the events between both states."""
-        events = self._events(before, state)
-        return replace(state, history=(*before.history, events) if len(events) else before.history)
+        events, dissipated = self._events(before, state), before.front_dissipation
+        if self.law.material.directed:
+            fields = (self.field(each.cells, each.fraction) for each in (before, state))
+            dissipated += self.attraction.dissipated(*fields) * self.contact_modulus * self.spacing / self.count
+        history = (*before.history, events) if len(events) else before.history
+        return replace(state, history=history, front_dissipation=dissipated)
 
     def _next_equilibrium(self, state, separation, control):
         """Find the equilibrium from a state with gaps. Areas, tensile loads and a first contact need a search."""
@@ -147,7 +152,8 @@ class BoundaryElements(FullContactProblem):
         """Find the equilibrium with a load or area by secants and halvings of the separation."""
         value = self.pressure if control.quantity == PRESSURE else self.area_fraction
         target, tolerance = control.target, self._tolerance(state, control)
-        sign = np.sign(target - value(state)) or 1.0
+        same = _SAME_SEPARATION * self.rms_height
+        sign, missing = np.sign(target - value(state)) or 1.0, abs(target - value(state))
         before, beyond, trial = state, None, state
         for _ in range(_MOST_TRIALS):
             ends = [before.separation, beyond.separation] if beyond else [-np.inf, np.inf]
@@ -159,13 +165,17 @@ class BoundaryElements(FullContactProblem):
             error = value(trial) - target
             if abs(error) <= tolerance:
                 return trial
+            if sign < 0 and error > missing and separation > before.separation + same:
+                # The surfaces separate, but the tension falls: the step has passed its largest value.
+                separation = 0.5 * (before.separation + separation)
+                continue
             if sign * error < 0:
-                before = trial
+                before, missing = trial, abs(error)
             else:
                 beyond = trial
             slope = self.slope(control.quantity, trial)
             separation = trial.separation - error / slope if slope < 0 else np.nan
-            if beyond and abs(before.separation - beyond.separation) < _SAME_SEPARATION * self.rms_height:
+            if beyond and abs(before.separation - beyond.separation) < same:
                 break
         raise NotConverged(f"found no equilibrium at a {control.quantity.replace('_', ' ')} of {target:g}")
 
@@ -309,6 +319,10 @@ class BoundaryElements(FullContactProblem):
         """Return the elastic energy minus the work of adhesion, divided by the nominal area, J/m^2."""
         return float(np.sum(self._energy_of_cells(state))) / self.count
 
+    def front_dissipation(self, state: CellState) -> float:
+        """Return what receding fronts have dissipated so far, J/m^2 of nominal area; 0 with one work of adhesion."""
+        return state.front_dissipation
+
     def is_unstable(self, state: CellState) -> bool:
         """Return False: every equilibrium is a minimum of energy."""
         return False
@@ -343,19 +357,20 @@ class BoundaryElements(FullContactProblem):
         else:
             control = solver.Control(**{"rigid" if self.space.free else "mean": separation / self.spacing})
         position, fraction = self._start(state, separation)
+        law = replace(self.attraction, before=fraction) if self.law.material.directed else self.attraction
         found = solver.minimise(
             self.space,
-            self.attraction,
+            law,
             self.cell_heights,
             position,
             fraction,
             control,
             _GAP_ERROR * self.rms_height / self.spacing,
         )
-        return self._state_of(found)
+        return self._state_of(found, law)
 
-    def _state_of(self, found):
-        """Return the state of a solved contact, with its rates and slopes."""
+    def _state_of(self, found, law):
+        """Return the state of a contact solved with a law of attraction, with its rates and slopes."""
         if found.held.all():
             return self.full_contact(found.load * self.contact_modulus)
         touching = found.fraction > 0 if self.adhesive else found.held
@@ -376,7 +391,8 @@ class BoundaryElements(FullContactProblem):
         )
         if not len(cells):
             return state
-        found_rates = solver.rates(self.space, self.attraction, self.cell_heights, found, _RATE_ERROR)
+        accuracy = _RATE_ERROR_OF_SPRINGS if self.law.material.directed else _RATE_ERROR
+        found_rates = solver.rates(self.space, law, self.cell_heights, found, accuracy)
         rates, fraction_rates = (each.ravel()[cells] for each in found_rates[1:])
         scale = self.count * self.spacing
         pressure_slope = float(np.sum(rates)) * self.contact_modulus / scale
@@ -438,14 +454,17 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
     largest = float(np.abs(heights, where=np.isfinite(heights), out=np.zeros_like(heights)).max())
     attraction: AtDistance | ShortRange = NoAttraction()
     if material.surface_energy:
-        adhesion_length, strength = material.adhesion_length / h, material.interface_strength / material.contact_modulus
+        adhesion_length = material.adhesion_length / h
+        ratio = material.receding.surface_energy / material.surface_energy
         if attraction_on(material, h) == FINITE_RANGE:
-            attraction = Cohesive(adhesion_length, strength)
+            strength = material.interface_strength / material.contact_modulus * ratio**0.5
+            attraction = Cohesive(adhesion_length, strength, ratio)
         else:
             R, above = asperities.radius_of_curvature, asperities.height - heights.ravel()[cell]
             jump_in = law.jump_in_approach(R)
             radius = law.contact_radius(jump_in, R)
-            attraction = ShortRange(adhesion_length, strength, cell, above / h, -jump_in / h, radius / h)
+            strength = material.receding.interface_strength / material.contact_modulus
+            attraction = ShortRange(adhesion_length, strength, cell, above / h, -jump_in / h, radius / h, ratio)
         if attraction.reach * h < _SMALLEST_OPENING * largest:
             raise ValueError(
                 f"surface_energy: {material.surface_energy:g} J/m^2 is too small: rounding of heights up to "

@@ -17,11 +17,14 @@ subtracts a term in proportion to the perimeter. This term lowers the work W of 
 W = dgamma (1 - b + 2 b w*f). So works and fractions depend on each other, and follow each other in a few rounds. Where
 dgamma is a field, W = (1 - b) dgamma + b (dgamma w*f + w*(dgamma f)).
 
+A front may advance at one work of adhesion and recede at a larger one (`DirectedBonds`). Between both it stands.
+
 Lengths are in units of the cell size, pressures in E*.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -117,6 +120,10 @@ class Bonds:
         """Return the fraction f of each cell: its tension divided by the peak."""
         return self.tension(gap) / self.peak
 
+    def ratio(self, gap: np.ndarray) -> np.ndarray:
+        """Return the work of each cell in its present direction over that on closing, (k,); 0 where the front stands."""
+        return np.ones(len(gap))
+
     def at(self, field: np.ndarray) -> np.ndarray:
         """Return the values of the cells, (k,), from a field, (n, n)."""
         return field.ravel()[self.cells]
@@ -179,6 +186,89 @@ class LinearBonds(Bonds):
         """Return the gap of each cell from its fraction, in cell sizes."""
         return self.reach * (1 - fraction)
 
+    def stronger(self, ratio: np.ndarray | float) -> LinearBonds:
+        """Return the bonds with a larger work: peak and range grow with the square root of the ratio of the works."""
+        return LinearBonds(self.cells, self.work * ratio, self.reach * np.sqrt(ratio))
+
+
+@dataclass(frozen=True, eq=False)
+class DirectedBonds(Bonds):
+    """Bonds with a work of adhesion where gaps close, and a larger one where they open.
+
+    From a fraction f0, a cell closes by the law with the advancing work, and opens by the law with the receding work:
+
+        closing, g < r_a (1 - f0):  t = s_a (1 - g/r_a)
+        opening, g > r_r (1 - f0):  t = s_r (1 - g/r_r)
+        between:                    t = k g,   k = (s/r) f0/(1 - f0),   f = f0
+
+    Peaks and ranges are in proportion to the square root of the work, so s/r is the same for both laws, and the tension
+    is continuous. Between, the front stands, and the bond is a spring through the origin, as in cohesive zones that
+    unload elastically. The state is then that of a front with a work between both. A cell that closes and opens again
+    dissipates the difference of both works, in proportion to its fraction f0.
+
+    Parameters
+    ----------
+    closing, opening : laws with the advancing and with the receding work.
+    before : (k,), fraction f0 of each cell.
+    """
+
+    closing: LinearBonds
+    opening: LinearBonds
+    before: np.ndarray
+
+    @property
+    def cells(self):
+        """Flat indices of the cells, (k,), or the slice of all cells."""
+        return self.closing.cells
+
+    @property
+    def peak(self):
+        """Tension of each cell at zero gap on closing, in E*."""
+        return self.closing.peak
+
+    @property
+    def reach(self):
+        """Range of each cell on opening, in cell sizes."""
+        return self.opening.reach
+
+    @property
+    def _spring(self):
+        """Stiffness k of each cell, in E* per cell size; 0 in full contact, where the front cannot stand."""
+        open_part, softening = 1 - self.before, self.closing.peak / self.closing.reach
+        return np.divide(softening * self.before, open_part, out=np.zeros_like(open_part), where=open_part > 0)
+
+    def _standing_gap(self, gap):
+        """Return the gap of each cell, but at most that at which the cell begins to open."""
+        return np.minimum(gap, self.opening.gap(self.before))
+
+    def _choose(self, gap, closing, standing, opening):
+        """Return, for each cell, one of three values by the branch of the law at its gap."""
+        advances, recedes = gap < self.closing.gap(self.before), gap >= self.opening.gap(self.before)
+        return np.where(advances, closing, np.where(recedes, opening, standing))
+
+    def ratio(self, gap: np.ndarray) -> np.ndarray:
+        """Return the work of each cell in its present direction over that on closing, (k,); 0 where the front stands."""
+        return self._choose(gap, 1.0, 0.0, self.opening.work / self.closing.work)
+
+    def fraction(self, gap: np.ndarray) -> np.ndarray:
+        """Return the fraction f of each cell."""
+        return np.clip(self.before, self.closing.fraction(gap), self.opening.fraction(gap))
+
+    def tension(self, gap: np.ndarray) -> np.ndarray:
+        """Return the tension of each cell, in E*."""
+        standing = self._spring * self._standing_gap(gap)
+        return self._choose(gap, self.closing.tension(gap), standing, self.opening.tension(gap))
+
+    def energy(self, gap: np.ndarray) -> np.ndarray:
+        """Return the energy of each cell with what it dissipates, in E* times cell size^3."""
+        closing = self.closing.energy(gap) - (self.opening.work - self.closing.work) * self.before
+        standing = 0.5 * self._spring * self._standing_gap(gap) ** 2 - self.opening.work * self.before
+        return self._choose(gap, closing, standing, self.opening.energy(gap))
+
+    def softening(self, gap: np.ndarray) -> np.ndarray:
+        """Return the fall of the tension with the gap, -dt/dg, of each open cell; negative where the front stands."""
+        return self._choose(gap, self.closing.softening(gap), -self._spring, self.opening.softening(gap))
+
 
 @dataclass(frozen=True, eq=False)
 class Tangent:
@@ -189,13 +279,14 @@ class Tangent:
     Parameters
     ----------
     cells : (k,) int, flat indices of the cells with 0 < f < 1.
-    fraction, peak, softening : (k,), values of the cells.
+    fraction, softening : (k,), values of the cells.
+    peak : (k,), tension at zero gap in the direction of each front; infinite where it stands.
     coupling : (k, k) sparse, change of the peaks with the fractions; None without an effect.
     """
 
     cells: np.ndarray
     fraction: np.ndarray
-    peak: np.ndarray | float
+    peak: np.ndarray
     softening: np.ndarray
     coupling: csr_array | None = None
 
@@ -208,6 +299,19 @@ class Tangent:
         for _ in range(_ROUNDS):
             fraction = (tension + (1 - self.fraction) * (self.coupling @ fraction)) / self.peak
         return fraction, tension + self.coupling @ fraction
+
+
+def directed(bonds: LinearBonds, ratio: float, before: np.ndarray | None) -> Bonds:
+    """Return bonds whose work on opening is larger by a ratio, from the fractions before, (n, n); for 1 the same bonds."""
+    if before is None:
+        return bonds
+    return DirectedBonds(bonds, bonds.stronger(ratio), before.ravel()[bonds.cells])
+
+
+def peak_by_direction(bonds: Bonds, gap: np.ndarray) -> np.ndarray:
+    """Return the tension of each cell at zero gap in the direction of its front, (k,); infinite where it stands."""
+    ratio = bonds.ratio(gap)
+    return np.where(ratio > 0, bonds.peak * np.sqrt(ratio), np.inf)
 
 
 def weights_between(cells: np.ndarray, grid: int) -> csr_array:
@@ -279,11 +383,11 @@ class AtDistance(Bonds):
     def _full_energy(self):
         return float(np.mean(self.bonds_of(slice(None)).energy(np.zeros(1))))
 
-    def tangent(self, bonds: Bonds, fraction: np.ndarray, grid: int) -> Tangent:
-        """Return the tangent of the law at given fractions, (k,)."""
+    def tangent(self, bonds: Bonds, fraction: np.ndarray, gap: np.ndarray, grid: int) -> Tangent:
+        """Return the tangent of the law at given fractions and gaps, (k,)."""
         partial = np.flatnonzero((fraction > 0) & (fraction < 1))
-        bonds, fraction = self.bonds_of(partial), fraction[partial]
-        return Tangent(partial, fraction, bonds.peak, bonds.softening(bonds.gap(fraction)))
+        peak, softening = peak_by_direction(bonds, gap)[partial], bonds.softening(gap)[partial]
+        return Tangent(partial, fraction[partial], peak, softening)
 
 
 @dataclass(frozen=True, eq=False)
@@ -292,21 +396,34 @@ class Cohesive(AtDistance):
 
     Parameters
     ----------
-    adhesion_length : dgamma/E* of each cell, (n, n) or a number, in cell sizes.
-    strength : peak tension of the interface, in E*.
+    adhesion_length : dgamma/E* of each cell, (n, n) or a number, in cell sizes; that of an advancing front.
+    strength : peak tension of the interface, in E*, at which closed cells open.
+    ratio : work of adhesion of a receding front over that of an advancing one.
+    before : (n, n), fractions at the last equilibrium, if the ratio is not 1.
     """
 
     adhesion_length: np.ndarray | float
     strength: float
+    ratio: float = 1.0
+    before: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         """Set the gap at which the tension falls to zero, in cell sizes; with a map, the largest one."""
-        object.__setattr__(self, "reach", float(np.max(2 * self.adhesion_length / self.strength)))
+        reach = 2 * self.ratio * self.adhesion_length / self.strength
+        object.__setattr__(self, "reach", float(np.max(reach)))
+
+    def dissipated(self, before: np.ndarray, after: np.ndarray) -> float:
+        """Return what receding fronts dissipate between two fields of fractions, (n, n), in E* times cell size^3."""
+        return float(np.sum((self.ratio - 1) * self.adhesion_length * np.maximum(before - after, 0.0)))
+
+    def bonds(self, fraction: np.ndarray) -> Bonds:
+        """Return the law of every cell, in the direction of its front."""
+        return directed(self.bonds_of(slice(None)), self.ratio, self.before)
 
     def bonds_of(self, cells: np.ndarray | slice) -> LinearBonds:
         """Return the law of some cells."""
         work = at_cells(self.adhesion_length, cells)
-        return LinearBonds(cells, work, 2 * work / self.strength)
+        return LinearBonds(cells, work, 2 * math.sqrt(self.ratio) * work / self.strength)
 
 
 @dataclass(frozen=True, eq=False)
@@ -333,11 +450,12 @@ class ShortRange:
 
     Parameters
     ----------
-    adhesion_length : dgamma/E* of each cell, (n, n) or a number, in cell sizes.
+    adhesion_length : dgamma/E* of each cell, (n, n) or a number, in cell sizes; that of an advancing front.
     strength : tension, in E*, at which a closed cell opens although its four neighbours are closed.
     summits, above, jump_in, radius : (k,), cell of each summit, its height above the node of the cell, the largest gap
         at which it jumps into contact, and the contact radius of a lone summit after its jump, in cell sizes. At most a
         quarter of the side closes at once. A disc much smaller than this radius could open again.
+    ratio, before : as in `Cohesive`.
     """
 
     adhesion_length: np.ndarray | float
@@ -346,11 +464,13 @@ class ShortRange:
     above: np.ndarray
     jump_in: np.ndarray
     radius: np.ndarray
+    ratio: float = 1.0
+    before: np.ndarray | None = None
     name = SHORT_RANGE
     rounds = _ROUNDS_OF_STEP
     holds_inside = True
 
-    def bonds(self, fraction: np.ndarray) -> LinearBonds:
+    def bonds(self, fraction: np.ndarray) -> Bonds:
         """Return the law of every cell, with the work at the present fractions; only neighbours of contact attract."""
         cells, length = np.flatnonzero(with_neighbours(fraction > 0)), self.adhesion_length
         own = at_cells(length, cells)
@@ -358,12 +478,12 @@ class ShortRange:
         # Work and perimeter term follow from one energy, so a cell also has half of the works of its neighbours.
         by_others = by_own if np.ndim(length) == 0 else average(length * fraction).ravel()[cells]
         work = (1 - PERIMETER) * own + PERIMETER * (by_own + by_others)
-        return LinearBonds(cells, work, np.sqrt(2 * BOND_COMPLIANCE * work))
+        return directed(LinearBonds(cells, work, np.sqrt(2 * BOND_COMPLIANCE * work)), self.ratio, self.before)
 
     @property
     def straight_strength(self) -> float:
         """Tension at which a closed cell at a straight edge starts to open, in E*; with a map, the largest one."""
-        return straight_strength(float(np.max(self.adhesion_length)))
+        return straight_strength(self.ratio * float(np.max(self.adhesion_length)))
 
     @property
     def reach(self) -> float:
@@ -380,6 +500,14 @@ class ShortRange:
     def energies(self, cells: np.ndarray, fraction: np.ndarray, mean_fraction: np.ndarray) -> np.ndarray:
         """Return the energies of some cells, (k,), in E* times cell size^3, with the work of their tension."""
         return -at_cells(self.adhesion_length, cells) * (fraction - PERIMETER * fraction * (1 - mean_fraction))
+
+    def dissipated(self, before: np.ndarray, after: np.ndarray) -> float:
+        """Return what receding fronts dissipate between two fields of fractions, (n, n), in E* times cell size^3.
+
+        It is the difference of both works, integrated while all fractions change in proportion.
+        """
+        share = 1 - PERIMETER + PERIMETER * (average(before) + average(after))
+        return float(np.sum((self.ratio - 1) * self.adhesion_length * share * np.maximum(before - after, 0.0)))
 
     @staticmethod
     def reported_areas(fraction: np.ndarray, mean_fraction: np.ndarray) -> np.ndarray:
@@ -434,12 +562,14 @@ class ShortRange:
             closed[(row + offset[rows]) % grid, (column + offset[columns]) % grid] = True
         return closed
 
-    def tangent(self, bonds: LinearBonds, fraction: np.ndarray, grid: int) -> Tangent:
-        """Return the tangent of the law at given fractions, (k,)."""
+    def tangent(self, bonds: Bonds, fraction: np.ndarray, gap: np.ndarray, grid: int) -> Tangent:
+        """Return the tangent of the law at given fractions and gaps, (k,)."""
         partial = (fraction > 0) & (fraction < 1)
-        cells, peak, reach = (np.asarray(each)[partial] for each in (bonds.cells, bonds.peak, bonds.reach))
+        cells, ratio = np.asarray(bonds.cells)[partial], bonds.ratio(gap)[partial]
+        peak = peak_by_direction(bonds, gap)[partial]
         length = np.broadcast_to(at_cells(self.adhesion_length, cells), cells.shape)
         coupling = weights_between(cells, grid)
         row = np.repeat(np.arange(len(cells)), np.diff(coupling.indptr))
-        coupling.data *= PERIMETER * (length[row] + length[coupling.indices]) / (BOND_COMPLIANCE * peak[row])
-        return Tangent(cells, fraction[partial], peak, peak / reach, coupling)
+        change_of_work = PERIMETER * ratio[row] * (length[row] + length[coupling.indices])
+        coupling.data *= change_of_work / (BOND_COMPLIANCE * peak[row])
+        return Tangent(cells, fraction[partial], peak, bonds.softening(gap)[partial], coupling)

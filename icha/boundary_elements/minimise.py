@@ -308,7 +308,8 @@ def rates(
     The separation is the mean of the positions or, on a free square, the rigid approach.
     """
     bonds, free = law.bonds(found.fraction), ~found.held
-    tangent = law.tangent(bonds, found.fraction.ravel()[bonds.cells], len(heights))
+    gap = bonds.at(found.position - heights)
+    tangent = law.tangent(bonds, bonds.at(found.fraction), gap, len(heights))
     if space.free:
         control, start = Control(rigid=0.0), np.zeros(heights.shape)
         force = np.where(free, 1 / space.mean_compliance, 0.0)

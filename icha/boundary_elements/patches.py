@@ -30,6 +30,7 @@ class CellState:
         largest pressure.
     gap_residual : largest displacement by the residual pressures, m.
     pending : number of cells within reach (of summits, or overlapping) that stay open, because contact is not stable.
+    front_dissipation : energy that receding fronts have dissipated so far, J/m^2 of nominal area.
     history : events of the path up to this state, one `Events` for each equilibrium with events.
     """
 
@@ -44,6 +45,7 @@ class CellState:
     residual: float = 0.0
     gap_residual: float = 0.0
     pending: int = 0
+    front_dissipation: float = 0.0
     history: tuple[Events, ...] = ()
 
 

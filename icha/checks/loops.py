@@ -10,7 +10,14 @@ from icha.path.energy_balance import event_error, integration_error, pressure_ju
 from icha.path.targets import EVENT_ERROR_OVER_LOSS
 
 # Parts of the hysteresis loss of a run.
-LOSSES = ("loss_by_jump_in", "loss_by_jump_off", "loss_by_coalescence", "loss_by_load_jump", "loss_unattributed")
+LOSSES = (
+    "loss_by_jump_in",
+    "loss_by_jump_off",
+    "loss_by_coalescence",
+    "loss_by_load_jump",
+    "front_dissipation",
+    "loss_unattributed",
+)
 # Counts of events in a run, in the order of the flags of `event_kind`.
 EVENT_COUNTS = ("jump_in_count", "jump_off_count", "coalescence_count", "split_count")
 

@@ -257,6 +257,9 @@ class Campaign(Section):
             if MODELS[label].by_summits and self.materials[name].thickness is not None:
                 reason = f"need a half-space, because their law is that of a half-space, but {name!r} is a layer"
                 yield ("models", index), label, f"{reason}; expected [boundary_elements], or no `thickness` in {name!r}"
+            if MODELS[label].by_summits and self.materials[name].receding_energy is not None:
+                reason = f"have one work of adhesion, but {name!r} has an advancing and a receding one"
+                yield ("models", index), label, f"{reason}; expected [boundary_elements]"
         for (index, label), name in itertools.product(enumerate(study.models), study.surfaces):
             if MODELS[label].by_summits and not self.is_flat(name):
                 reason = f"need a nominally flat surface, because they are wrong on shapes, but {name!r} has a shape"

@@ -82,6 +82,18 @@ def _bodies_of(content: Mapping) -> Any:
     return [body | own if isinstance(body, Mapping) else body for body in bodies]
 
 
+# Works of adhesion by direction.
+_DIRECTIONS = {
+    "type": "object",
+    "required": ["advancing", "receding"],
+    "additionalProperties": False,
+    "properties": {
+        "advancing": {"type": "string", "pattern": PATTERN, "examples": ["30 mJ/m^2"]},
+        "receding": {"type": "string", "pattern": PATTERN, "examples": ["90 mJ/m^2"]},
+    },
+}
+
+
 class MaterialSection(Section):
     """Material of the elastic body, and adhesion between this body and the rough surface."""
 
@@ -101,8 +113,12 @@ class MaterialSection(Section):
     )
     contact_modulus: Modulus
     """Composite elastic modulus E* (contact modulus). Required without `bodies` and `youngs_modulus`."""
-    surface_energy: SurfaceEnergy
-    """Work of adhesion Δγ. The value `0 J/m^2` means no adhesion."""
+    surface_energy: Annotated[SurfaceEnergy, OrSchema(_DIRECTIONS)]
+    """Work of adhesion Δγ. The value `0 J/m^2` means no adhesion. With `{advancing: 30 mJ/m^2, receding: 90 mJ/m^2}`,
+    the edge of a contact advances at a smaller work of adhesion than it recedes, and stands in between."""
+    receding_energy: SurfaceEnergy | None = None
+    """Work of adhesion of a receding edge, for studies that vary it; `surface_energy` with two values sets it. Only
+    with `models: [boundary_elements]`. Default: that of an advancing edge."""
     interaction_range: Length = Field(default=f"{VAN_DER_WAALS_RANGE * 1e9:g} nm", validate_default=True)
     """Range ε of the attraction. The range determines when asperities jump into contact. Boundary elements have this
     range if the grid resolves it. The Tabor parameter is μ =
@@ -147,6 +163,29 @@ class MaterialSection(Section):
         if len(elastic) == 1 and content.get("thickness") is not None:
             combined.setdefault("poisson_ratio", elastic[0].poisson_ratio)
         return combined
+
+    @model_validator(mode="before")
+    @classmethod
+    def _divide_directions(cls, content: Any) -> Any:
+        """Divide a work of adhesion by direction into two keys."""
+        energy = content.get("surface_energy") if isinstance(content, Mapping) else None
+        if not isinstance(energy, Mapping):
+            return content
+        if set(energy) != {"advancing", "receding"}:
+            keys = ", ".join(map(str, energy)) or "no keys"
+            raise ValueError(f"surface_energy: has {keys}; expected one value, or the keys advancing and receding")
+        if content.get("receding_energy") is not None:
+            raise ValueError("receding_energy: is given beside surface_energy.receding; expected one of both")
+        return {**content, "surface_energy": energy["advancing"], "receding_energy": energy["receding"]}
+
+    @model_validator(mode="after")
+    def _check_directions(self):
+        if self.receding_energy is not None and not 0 < self.surface_energy <= self.receding_energy:
+            raise ValueError(
+                f"surface_energy: the advancing value {self.surface_energy:g} J/m^2 must be positive, and at most the "
+                f"receding value {self.receding_energy:g} J/m^2"
+            )
+        return self
 
     @model_validator(mode="after")
     def _check_layer(self):

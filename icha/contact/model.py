@@ -176,6 +176,9 @@ class ContactModel(Protocol):
     def stored_energy(self, state: State) -> float:
         """Return elastic energy minus energy of adhesion per nominal area, J/m^2; zero without contact."""
 
+    def front_dissipation(self, state: State) -> float:
+        """Return what receding fronts have dissipated so far, J/m^2 of nominal area; 0 with one work of adhesion."""
+
     def is_unstable(self, state: State) -> bool:
         """Return whether a spot is unstable: the approach of the spot grows while the surfaces move apart."""
 

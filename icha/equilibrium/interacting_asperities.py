@@ -112,6 +112,10 @@ class InteractingAsperities(AsperityContact):
         displacement = spots.height - state.separation - spots.approach
         return float(np.sum(law.energy(a, R) + 0.5 * law.force(a, R) * displacement)) / self.area
 
+    def front_dissipation(self, state: ContactState) -> float:
+        """Return 0: fronts advance and recede at the same work of adhesion."""
+        return 0.0
+
     def reason_beyond(self, state: ContactState) -> str:
         """Return an empty text: the areas and gaps of the path limit this model."""
         return ""
@@ -193,13 +197,16 @@ class AsperityObservables:
 def contact_of(surface: Surface, material: Material) -> InteractingAsperities:
     """Return the contact of a surface and a material.
 
-    Raises `ValueError` for a layer, for a surface with a shape and for a surface without summits. On a shape the model
+    Raises `ValueError` for a layer, for works of adhesion by direction, for a surface with a shape and for a surface
+    without summits. On a shape the model
     is wrong: the pull-off force of a rough sphere was 0.4 times that of boundary elements.
     """
     if material.layered:
         raise ValueError(
             f"thickness: {material.thickness:g} m; the asperity model is only for a half-space. Use boundary elements"
         )
+    if material.directed:
+        raise ValueError("surface_energy: the asperity model has one work of adhesion. Use boundary elements")
     if surface.shape:
         raise ValueError("shape: the asperity model is only for nominally flat surfaces. Use boundary elements")
     return InteractingAsperities(JKR(material), find_summits(surface), surface.unit_height, surface.unit_slope)

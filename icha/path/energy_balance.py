@@ -1,7 +1,7 @@
 """Energy balance of a path: the work of every step, the stored energy, and the losses in events.
 
 An event is a jump of a spot into or out of contact, the coalescence of two spots to a union, or the split of a union.
-Between two events the stored energy changes by the work done. An event changes the stored energy at constant
+Between two events the stored energy changes by the work done, minus what receding fronts dissipate. An event changes the stored energy at constant
 separation, and the released energy is lost. Over a closed path, all losses add up to the area of the hysteresis loop of
 pressure against separation. Every jump has a reference loss: the energy that it would release if its spot were alone.
 """
@@ -64,6 +64,7 @@ class Step:
     separation_change : change of the mean separation, m.
     work : work done on the contact, -(integral of p du), J/m^2.
     stored : change of the stored energy, J/m^2.
+    front : energy that receding fronts dissipate, J/m^2.
     pressure_jump : change of the pressure that the stiffnesses at both ends do not explain, Pa.
     integration_error : estimated error of the work by the numerical integration, without events, J/m^2.
     may_change_pressure : whether there are events in which the pressure may jump; without adhesion these are only
@@ -74,6 +75,7 @@ class Step:
     separation_change: float
     work: float
     stored: float
+    front: float
     pressure_jump: float
     integration_error: float
     may_change_pressure: bool
@@ -100,6 +102,7 @@ class Step:
             separation_change=du,
             work=-(0.5 * du * (p + q) + du**2 * (slope - end_slope) / 12),
             stored=contact.stored_energy(after) - contact.stored_energy(before),
+            front=contact.front_dissipation(after) - contact.front_dissipation(before),
             pressure_jump=pressure_jump(du, q - p, slope, end_slope),
             integration_error=error,
             may_change_pressure=bool(count),
@@ -113,8 +116,8 @@ class Step:
 
     @property
     def loss(self) -> float:
-        """Energy that is lost in the step, J/m^2: work minus change of the stored energy."""
-        return self.work - self.stored
+        """Energy that is lost in events, J/m^2: work minus change of the stored energy minus dissipation of fronts."""
+        return self.work - self.stored - self.front
 
     @property
     def event_error(self) -> float:
@@ -146,6 +149,7 @@ class EnergyBalance:
     jump_in, jump_off : losses by jumps into and out of contact.
     coalescence : loss by the coalescence of spots and by the splitting of unions.
     load_jump : loss by jumps at constant load, which happen only under load control.
+    front : dissipation of receding fronts, whose work of adhesion is larger than that of advancing fronts.
     unattributed : all other losses, caused by errors of the integration and of the interaction (see `_CERTAIN_LOSS`).
     """
 
@@ -154,6 +158,7 @@ class EnergyBalance:
     jump_off: float = 0.0
     coalescence: float = 0.0
     load_jump: float = 0.0
+    front: float = 0.0
     unattributed: float = 0.0
 
     def add_step(self, contact: ContactModel, step: Step) -> EnergyBalance:
@@ -184,6 +189,7 @@ class EnergyBalance:
             jump_in=self.jump_in + jump_in,
             jump_off=self.jump_off + jump_off,
             coalescence=self.coalescence + (rest if united else 0.0),
+            front=self.front + step.front,
             unattributed=self.unattributed + (0.0 if united else rest),
         )
 
@@ -191,7 +197,9 @@ class EnergyBalance:
         """Return the balance after a jump between two states at constant pressure, Pa; the pressure does work."""
         work = -pressure * (after.separation - before.separation)
         stored = contact.stored_energy(after) - contact.stored_energy(before)
-        return replace(self, work=self.work + work, load_jump=self.load_jump + work - stored)
+        front = contact.front_dissipation(after) - contact.front_dissipation(before)
+        lost = self.load_jump + work - stored - front
+        return replace(self, work=self.work + work, load_jump=lost, front=self.front + front)
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,10 +265,11 @@ def summarise_loop(
     # No energy is stored at the start and at the end of the loop, so the whole work is lost.
     loss = last["work"]
     losses = {f"loss_{name}": last[f"dissipated_{name}"] for name in _LOSSES}
+    losses["front_dissipation"] = last["dissipated_by_front"]
     return {
         "pull_off_pressure": tension,
         "pull_off_separation": rows[pull_off_row]["mean_separation"],
-        "pull_off_over_strength": tension / material.interface_strength if adhesive else 0.0,
+        "pull_off_over_strength": tension / material.receding.interface_strength if adhesive else 0.0,
         "pull_off_over_summits": tension / summit_pull_off_pressure if summit_pull_off_pressure else 0.0,
         "detachment_pressure": touching["nominal_pressure"] if adhesive else 0.0,
         "detachment_separation": touching["mean_separation"],

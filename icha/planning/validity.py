@@ -211,7 +211,8 @@ def _indenters(campaign):
             jumped = format_quantity(contact_radius_at("indentation", 0.0, *properties), "m")
             at_zero = f"{format_quantity(at_rest, 'm')} ({at_rest * cells:.2g} cells) at zero load"
             found = [f"{jumped} after the jump-in", at_zero, *found]
-        released = pull_off_state(*properties) if energy else None
+        receding = material.receding_energy or energy
+        released = pull_off_state(shape, material.contact_modulus, receding) if energy else None
         force = format_quantity(-float(released.force), "N") if released else ""
         pull_off = f"a pull-off force of {force}, and " if force else ""
         text = (

@@ -66,6 +66,7 @@ def loop_values(
     radius = sphere_radius(surface)
     if surface.shape is None or material.layered:
         return values
+    energy = material.receding.surface_energy
     if known := pull_off_state(surface.shape, material.contact_modulus, energy):
         values["pull_off_force_over_theory"] = pull_off / -float(known.force)
     if radius is None:

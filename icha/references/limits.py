@@ -137,7 +137,7 @@ def doubts(surface: Surface, material: Material, path: Path, model: str) -> list
     ]
     if MODELS[model].by_cells and attraction_on(material, surface.spacing) == SHORT_RANGE:
         if surface.smooth and path.unload and not material.layered:
-            pull_off = pull_off_state(surface.shape, material.contact_modulus, material.surface_energy)
+            pull_off = pull_off_state(surface.shape, material.contact_modulus, material.receding.surface_energy)
             if pull_off and (text := describe_coarse_pull_off(surface.shape, surface.spacing, pull_off.contact_radius)):
                 found.append(text)
         if text := describe_short_range(tabor_parameter_of(surface, material)):

@@ -148,7 +148,7 @@ def _compute(solver, surface, material, path, model, seed, progress, kept):
         pull_off = record.snapshots[-1]["snapshot_step"]
         # Nominal tension if all summits had their pull-off force at the same time, Pa.
         radii = float(np.sum(contact.asperities.radius_of_curvature))
-        summits_pull = 1.5 * np.pi * material.surface_energy * radii / contact.area
+        summits_pull = 1.5 * np.pi * material.receding.surface_energy * radii / contact.area
         least_area = 1 / surface.grid**2 if MODELS[model].by_cells else 0.0
         loop = summarise_loop(record.steps, pull_off, material, summits_pull, record.unattributed, least_area)
         loop["uphill_jump_in_count"] = count_uphill_jumps_in(record)

@@ -135,6 +135,6 @@ def _step_values(contact: ContactModel, waypoint: Waypoint) -> dict:
     }
     if balance is None:
         return row
-    kinds = ("jump_in", "jump_off", "coalescence", "load_jump")
+    kinds = ("jump_in", "jump_off", "coalescence", "load_jump", "front")
     row |= {"work": balance.work, "stored_energy": contact.stored_energy(state)}
     return row | {f"dissipated_by_{kind}": getattr(balance, kind) for kind in kinds}

@@ -248,7 +248,14 @@ def test_jumps_that_nearly_cancel_lose_no_more_than_each_alone(gained_and_lost):
     """Where the range is long a jump into contact may be uphill; the two are not a share of what the step loses."""
     events = Events(np.array([JUMP_IN, JUMP_OFF]), np.zeros((2, 2)), np.ones(2, int), np.array(gained_and_lost))
     step = Step(
-        0.1, work=0.6, stored=0.1, pressure_jump=0.0, integration_error=0.0, may_change_pressure=True, events=events
+        0.1,
+        work=0.6,
+        stored=0.1,
+        front=0.0,
+        pressure_jump=0.0,
+        integration_error=0.0,
+        may_change_pressure=True,
+        events=events,
     )
     balance = EnergyBalance().add_step(few.contact_of([few.HEIGHT], period=1.0), step)
     assert (balance.jump_in, balance.jump_off) == pytest.approx(gained_and_lost)
