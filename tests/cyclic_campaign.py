@@ -72,7 +72,7 @@ def unloaded(run, between=0):
     ended = np.arange(len(at)) == len(at) - 1
     columns["work"] = work
     columns["dissipated_by_jump_off"] = np.where(ended, loss, 0.0)
-    for name in ("jump_in", "coalescence", "load_jump"):
+    for name in ("jump_in", "coalescence", "load_jump", "front"):
         columns[f"dissipated_by_{name}"] = np.zeros(len(at))
     columns["stored_energy"] = work - columns["dissipated_by_jump_off"]
 

@@ -113,7 +113,9 @@ def directed_sphere(spacing: float, ratio: float, radius: float, grid: int = 64)
         rate = (4 / 3 * a**3 - force) ** 2 / (8 * math.pi * a**3)
     loads, stands = slice(1, turn + 1), (run.leg == 1).values & (rate > 1.1) & (rate < 0.5 * (1 + ratio))
     recedes = (run.leg == 1).values & (a < 0.97 * a[turn]) & (a > 0.7 * a[turn])
-    largest = -float(sphere_contact(min(a[turn], sphere_pull_off(1.0, 1.0, ratio).contact_radius), 1.0, 1.0, ratio).force)
+    largest = -float(
+        sphere_contact(min(a[turn], sphere_pull_off(1.0, 1.0, ratio).contact_radius), 1.0, 1.0, ratio).force
+    )
     front = (ratio - 1) * area[turn] / surface.period**2
     return {
         "ratio": ratio,

@@ -69,7 +69,9 @@ class Material:
     def _set_pair(self):
         """Set the works of adhesion from a pair of advancing and receding values."""
         if len(self.surface_energy) != 2 or self.receding_energy is not None:
-            raise ValueError(f"surface_energy: {self.surface_energy!r} must be a number, or a pair (advancing, receding)")
+            raise ValueError(
+                f"surface_energy: {self.surface_energy!r} must be a number, or a pair (advancing, receding)"
+            )
         advancing, receding = self.surface_energy
         object.__setattr__(self, "surface_energy", advancing)
         object.__setattr__(self, "receding_energy", receding)

@@ -120,8 +120,8 @@ class Bonds:
         """Return the fraction f of each cell: its tension divided by the peak."""
         return self.tension(gap) / self.peak
 
-    def ratio(self, gap: np.ndarray) -> np.ndarray:
-        """Return the work of each cell in its present direction over that on closing, (k,); 0 where the front stands."""
+    def direction(self, gap: np.ndarray) -> np.ndarray:
+        """Return the work of each cell in its present direction over that on closing, (k,); 0 if the front stands."""
         return np.ones(len(gap))
 
     def at(self, field: np.ndarray) -> np.ndarray:
@@ -246,8 +246,8 @@ class DirectedBonds(Bonds):
         advances, recedes = gap < self.closing.gap(self.before), gap >= self.opening.gap(self.before)
         return np.where(advances, closing, np.where(recedes, opening, standing))
 
-    def ratio(self, gap: np.ndarray) -> np.ndarray:
-        """Return the work of each cell in its present direction over that on closing, (k,); 0 where the front stands."""
+    def direction(self, gap: np.ndarray) -> np.ndarray:
+        """Return the work of each cell in its present direction over that on closing, (k,); 0 if the front stands."""
         return self._choose(gap, 1.0, 0.0, self.opening.work / self.closing.work)
 
     def fraction(self, gap: np.ndarray) -> np.ndarray:
@@ -302,7 +302,7 @@ class Tangent:
 
 
 def directed(bonds: LinearBonds, ratio: float, before: np.ndarray | None) -> Bonds:
-    """Return bonds whose work on opening is larger by a ratio, from the fractions before, (n, n); for 1 the same bonds."""
+    """Return bonds whose work on opening is larger by a ratio, from fractions before, (n, n), if these are given."""
     if before is None:
         return bonds
     return DirectedBonds(bonds, bonds.stronger(ratio), before.ravel()[bonds.cells])
@@ -310,7 +310,7 @@ def directed(bonds: LinearBonds, ratio: float, before: np.ndarray | None) -> Bon
 
 def peak_by_direction(bonds: Bonds, gap: np.ndarray) -> np.ndarray:
     """Return the tension of each cell at zero gap in the direction of its front, (k,); infinite where it stands."""
-    ratio = bonds.ratio(gap)
+    ratio = bonds.direction(gap)
     return np.where(ratio > 0, bonds.peak * np.sqrt(ratio), np.inf)
 
 
@@ -382,6 +382,10 @@ class AtDistance(Bonds):
     @property
     def _full_energy(self):
         return float(np.mean(self.bonds_of(slice(None)).energy(np.zeros(1))))
+
+    def dissipated(self, before: np.ndarray, after: np.ndarray) -> float:
+        """Return 0: a law that does not depend on the direction dissipates nothing at fronts."""
+        return 0.0
 
     def tangent(self, bonds: Bonds, fraction: np.ndarray, gap: np.ndarray, grid: int) -> Tangent:
         """Return the tangent of the law at given fractions and gaps, (k,)."""
@@ -565,7 +569,7 @@ class ShortRange:
     def tangent(self, bonds: Bonds, fraction: np.ndarray, gap: np.ndarray, grid: int) -> Tangent:
         """Return the tangent of the law at given fractions and gaps, (k,)."""
         partial = (fraction > 0) & (fraction < 1)
-        cells, ratio = np.asarray(bonds.cells)[partial], bonds.ratio(gap)[partial]
+        cells, ratio = np.asarray(bonds.cells)[partial], bonds.direction(gap)[partial]
         peak = peak_by_direction(bonds, gap)[partial]
         length = np.broadcast_to(at_cells(self.adhesion_length, cells), cells.shape)
         coupling = weights_between(cells, grid)

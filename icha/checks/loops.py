@@ -6,18 +6,10 @@ import numpy as np
 
 from icha.checks.findings import IDENTITY_LIMIT, LOSS, Definition
 from icha.contact.models import RESIDUAL_TOLERANCE, model_of
+from icha.datasets.quantities import LOSS_PARTS
 from icha.path.energy_balance import event_error, integration_error, pressure_jump
 from icha.path.targets import EVENT_ERROR_OVER_LOSS
 
-# Parts of the hysteresis loss of a run.
-LOSSES = (
-    "loss_by_jump_in",
-    "loss_by_jump_off",
-    "loss_by_coalescence",
-    "loss_by_load_jump",
-    "front_dissipation",
-    "loss_unattributed",
-)
 # Counts of events in a run, in the order of the flags of `event_kind`.
 EVENT_COUNTS = ("jump_in_count", "jump_off_count", "coalescence_count", "split_count")
 
@@ -68,7 +60,7 @@ def check_loop(run) -> Iterator[tuple]:
     # All energies are differences of works, so their errors are relative to the largest work.
     scale = float(np.max(np.abs(run["work"]))) or 1.0
     loss = float(run["hysteresis_loss"])
-    parts = sum(float(run[name]) for name in LOSSES if name in run)
+    parts = sum(float(run[name]) for name in LOSS_PARTS if name in run)
     yield "loss adds up", abs(loss - parts) / scale, IDENTITY_LIMIT
     yield "loss is the work", abs(loss - float(run["work"][-1])) / scale, IDENTITY_LIMIT
     yield from _check_losses(run, scale)

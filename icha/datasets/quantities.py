@@ -84,6 +84,7 @@ _QUANTITIES = {
     "loss_by_jump_off": Quantity("jump-off", "", "J m^-2"),
     "loss_by_coalescence": Quantity("coalescence", "", "J m^-2"),
     "loss_by_load_jump": Quantity("jumps at constant load", "", "J m^-2"),
+    "front_dissipation": Quantity("receding edge", "", "J m^-2"),
     "loss_unattributed": Quantity("unattributed", "", "J m^-2"),
     "largest_contact_area_fraction": Quantity("contact area at the largest load", "A/A_0", scale="percent"),
     "largest_reduced_pressure": Quantity("largest reduced pressure", _REDUCED),
@@ -114,8 +115,15 @@ _QUANTITIES = {
 }
 # The kinds of targets that are named unlike their variable.
 _QUANTITIES["area_fraction"] = _QUANTITIES["contact_area_fraction"]._replace(scale="")
-# The five parts of a loss.
-LOSS_PARTS = ("loss_by_jump_in", "loss_by_jump_off", "loss_by_coalescence", "loss_by_load_jump", "loss_unattributed")
+# The parts of a loss.
+LOSS_PARTS = (
+    "loss_by_jump_in",
+    "loss_by_jump_off",
+    "loss_by_coalescence",
+    "loss_by_load_jump",
+    "front_dissipation",
+    "loss_unattributed",
+)
 
 
 def quantity(name: str) -> Quantity:

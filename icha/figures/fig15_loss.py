@@ -33,6 +33,7 @@ PARTS = dict(
             {"fc": "0.65"},
             {"fc": "white", "hatch": "//////"},
             {"fc": "0.85", "hatch": "xxxx"},
+            {"fc": "white", "hatch": "||||"},
             {"fc": "white", "hatch": "...."},
         ),
         strict=True,

@@ -1,9 +1,10 @@
 """Energy balance of a path: the work of every step, the stored energy, and the losses in events.
 
 An event is a jump of a spot into or out of contact, the coalescence of two spots to a union, or the split of a union.
-Between two events the stored energy changes by the work done, minus what receding fronts dissipate. An event changes the stored energy at constant
-separation, and the released energy is lost. Over a closed path, all losses add up to the area of the hysteresis loop of
-pressure against separation. Every jump has a reference loss: the energy that it would release if its spot were alone.
+Between two events the stored energy changes by the work done, minus what receding fronts dissipate. An event changes
+the stored energy at constant separation, and the released energy is lost. Over a closed path, all losses add up to the
+area of the hysteresis loop of pressure against separation. Every jump has a reference loss: the energy that it would
+release if its spot were alone.
 """
 
 from __future__ import annotations

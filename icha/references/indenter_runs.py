@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 INTERVALS = 100
 # Smallest number of states for a fit.
 _LEAST_STATES = 3
+# Contact radius below which an edge that has stood recedes, divided by the radius where it stood.
+_RECEDED = 0.97
 
 
 class NoFit(ValueError):
@@ -92,10 +94,14 @@ def first_approach(rows: Sequence[Mapping[str, float]]) -> list[Mapping[str, flo
 
 
 def last_retraction(rows: Sequence[Mapping[str, float]]) -> list[Mapping[str, float]]:
-    """Return the steps of the last unloading that have contact, up to the largest tension."""
+    """Return the steps of the last unloading that have contact, up to the largest tension.
+
+    With works of adhesion by direction, steps where the edge still stands are left out.
+    """
     last = [row for row in rows if row["leg"] == rows[-1]["leg"]]
     end = int(np.argmin([row["force"] for row in last])) + 1
-    return [row for row in last[:end] if row["contact_radius"] > 0]
+    most = _RECEDED * last[0]["contact_radius"] if last[-1]["dissipated_by_front"] else math.inf
+    return [row for row in last[:end] if 0 < row["contact_radius"] < most]
 
 
 # For each branch of a loop, the function that selects the steps for its fit.
@@ -144,8 +150,8 @@ def reason_without_fit(run: xr.Dataset, branch: str) -> str:
 
 
 def steps_of(run: xr.Dataset) -> list[dict[str, float]]:
-    """Return force, indentation, contact radius and leg of every step of a run."""
-    names = "force", "indentation", "contact_radius", "leg"
+    """Return force, indentation, contact radius, leg and dissipation by fronts of every step of a run."""
+    names = "force", "indentation", "contact_radius", "leg", "dissipated_by_front"
     rows = zip(*(run[name].values.tolist() for name in names), strict=True)
     return [dict(zip(names, row, strict=True)) for row in rows]
 

@@ -38,13 +38,13 @@ def test_a_closed_and_opened_cell_dissipates_the_difference_of_both_works():
 
 
 def loop(cells, ratio, deep, grid=64, interaction_range=1e-9):
-    """Return a loop of a smooth sphere whose largest contact radius has about `cells` cells, and its side."""
+    """Return a loop of a smooth sphere whose largest contact radius has about `cells` cells."""
     a = deep * (ADVANCING * RADIUS**2 / MODULUS) ** (1 / 3)
     side = grid * a / cells
     surface = Surface(np.zeros((grid, grid)), side, "free", Sphere(RADIUS))
     material = Material(MODULUS, (ADVANCING, ratio * ADVANCING), interaction_range=interaction_range)
     depth = float(sphere_contact(a, RADIUS, MODULUS, ADVANCING).indentation)
-    return simulate(surface, material, Path(indentations=[depth], unload=True, snapshots=[]), model=MODEL), side
+    return simulate(surface, material, Path(indentations=[depth], unload=True, snapshots=[]), model=MODEL)
 
 
 def release_rate(run):
@@ -60,7 +60,7 @@ def sphere():
 
 
 def test_a_sphere_advances_stands_and_recedes(sphere):
-    run, _ = sphere
+    run = sphere
     rate, leg, a = release_rate(run) / ADVANCING, run["leg"].values, run["contact_radius"].values
     touching = a > 0.5 * a.max()
     np.testing.assert_allclose(rate[touching & (leg == 0)], 1.0, atol=0.03)
@@ -74,13 +74,13 @@ def test_a_sphere_advances_stands_and_recedes(sphere):
 
 
 def test_pull_off_is_that_of_the_receding_value(sphere):
-    run, _ = sphere
+    run = sphere
     assert float(run["pull_off_force"]) == pytest.approx(1.5 * np.pi * 3 * ADVANCING * RADIUS, rel=0.01)
     assert float(run["pull_off_force_over_jkr"]) == pytest.approx(1, rel=0.01)
 
 
 def test_the_loss_is_the_front_and_the_jumps(sphere):
-    run, side = sphere
+    run = sphere
     area, front = float(run["largest_contact_area_fraction"]), float(run["front_dissipation"])
     assert front == pytest.approx(2 * ADVANCING * area, rel=0.01)
     assert abs(float(run["loss_unattributed"])) < 1e-3 * float(run["hysteresis_loss"])
@@ -91,7 +91,7 @@ def test_the_loss_is_the_front_and_the_jumps(sphere):
 
 def test_a_small_contact_pulls_off_like_a_punch():
     # With ten times the work, the front of a small contact never recedes before the tension is largest (Kendall 1971).
-    run, _ = loop(cells=14, ratio=10, deep=2.0)
+    run = loop(cells=14, ratio=10, deep=2.0)
     a = float(run["contact_radius"].max())
     expected = np.sqrt(8 * np.pi * MODULUS * 10 * ADVANCING * a**3) - 4 / 3 * MODULUS * a**3 / RADIUS
     assert float(run["pull_off_force"]) == pytest.approx(expected, rel=0.02)
@@ -99,9 +99,9 @@ def test_a_small_contact_pulls_off_like_a_punch():
 
 def test_two_equal_values_are_one_value():
     assert Material(MODULUS, (ADVANCING, ADVANCING)) == Material(MODULUS, ADVANCING)
-    with pytest.raises(ValueError, match="surface_energy: the advancing value 0.03 J/m\\^2 must be .* smaller"):
+    with pytest.raises(ValueError, match=r"surface_energy: the advancing value 0.03 J/m\^2 must be .* smaller"):
         Material(MODULUS, (ADVANCING, 0.02))
-    with pytest.raises(ValueError, match="pair \\(advancing, receding\\)"):
+    with pytest.raises(ValueError, match=r"pair \(advancing, receding\)"):
         Material(MODULUS, (0.1, 0.2, 0.3))
 
 

@@ -24,17 +24,24 @@ SIDE, MODULUS, RADIUS, ENERGY = 64e-6, 1e6, 1e-3, 0.05
 SMOOTH = icha.Surface(np.zeros((64, 64)), SIDE, "free", Sphere(RADIUS))
 
 
-def rows_of(states, leg):
+def rows_of(states, leg, front=0.0):
     radius = np.asarray(states.contact_radius)
     columns = states.force, states.indentation, radius
-    return [dict(force=f, indentation=d, contact_radius=a, leg=leg) for f, d, a in zip(*columns, strict=True)]
+    return [
+        dict(force=f, indentation=d, contact_radius=a, leg=leg, dissipated_by_front=front)
+        for f, d, a in zip(*columns, strict=True)
+    ]
 
 
 def test_loop_of_two_jkr_spheres_returns_their_works_of_adhesion():
     unit = float(closed.sphere_pull_off(RADIUS, MODULUS, ENERGY).contact_radius)
     into = closed.sphere_contact(unit * np.linspace(1.5, 4, 40), RADIUS, MODULUS, 0.6 * ENERGY)
     out = closed.sphere_contact(unit * np.linspace(4, 0.9, 400), RADIUS, MODULUS, ENERGY)
-    rows = [*rows_of(into, 0), *rows_of(out, 1), {"force": 0.0, "indentation": 1.0, "contact_radius": 0.0, "leg": 1}]
+    rows = [
+        *rows_of(into, 0),
+        *rows_of(out, 1),
+        {"force": 0.0, "indentation": 1.0, "contact_radius": 0.0, "leg": 1, "dissipated_by_front": 0.0},
+    ]
     pull_off = -float(np.min(out.force))
     loop = {"pull_off_pressure": pull_off / SIDE**2, "hysteresis_loss": 0.003, "largest_contact_area_fraction": 0.2}
     values = loop_values(rows, loop, SMOOTH, icha.Material(MODULUS, ENERGY, 1e-9))
@@ -45,9 +52,27 @@ def test_loop_of_two_jkr_spheres_returns_their_works_of_adhesion():
     assert values["loss_over_contact"] == pytest.approx(0.003 / (0.2 * ENERGY))
 
 
+def test_states_where_the_edge_stands_are_not_of_the_receding_work():
+    unit = float(closed.sphere_pull_off(RADIUS, MODULUS, ENERGY).contact_radius)
+    into = closed.sphere_contact(unit * np.linspace(1.5, 4, 40), RADIUS, MODULUS, 0.3 * ENERGY)
+    # A punch between both works, then JKR with the receding one.
+    stands = [closed.sphere_contact(4 * unit, RADIUS, MODULUS, part * ENERGY) for part in np.linspace(0.3, 1, 20)]
+    out = closed.sphere_contact(unit * np.linspace(3.99, 0.9, 400), RADIUS, MODULUS, ENERGY)
+    rows = [*rows_of(into, 0), *(rows_of(each, 1)[0] for each in map(_single, stands)), *rows_of(out, 1, 1e-3)]
+    loop = {"pull_off_pressure": 1.0, "hysteresis_loss": 0.003, "largest_contact_area_fraction": 0.2}
+    material = icha.Material(MODULUS, (0.3 * ENERGY, ENERGY), 1e-9)
+    values = loop_values(rows, loop, SMOOTH, material)
+    assert values["work_of_adhesion_approach"] == pytest.approx(0.3 * ENERGY, rel=1e-5)
+    assert values["work_of_adhesion_retraction"] == pytest.approx(ENERGY, rel=1e-5)
+
+
+def _single(state):
+    return type(state)(*(np.atleast_1d(each) for each in state))
+
+
 def test_values_that_are_not_defined_are_left_out():
     loop = {"pull_off_pressure": 1.0, "hysteresis_loss": 0.0, "largest_contact_area_fraction": 0.1}
-    rows = [{"force": -1.0, "indentation": 0.0, "contact_radius": 1e-6, "leg": 1}]
+    rows = [{"force": -1.0, "indentation": 0.0, "contact_radius": 1e-6, "leg": 1, "dissipated_by_front": 0.0}]
     bare, sticky = icha.Material(MODULUS, 0.0, 1e-9), icha.Material(MODULUS, ENERGY, 1e-9)
     assert loop_values(rows, loop, SMOOTH, bare).keys() == {"pull_off_force"}
     assert "work_of_adhesion_retraction" not in loop_values(rows, loop, SMOOTH, sticky)
@@ -64,7 +89,9 @@ def test_values_that_are_not_defined_are_left_out():
 def loop_of_sphere(states, interaction_range=1e-9):
     """Return the values of a loop that passes some states in loading and backwards in unloading."""
     rows = rows_of(states, 0)
-    rows += [row | {"leg": 1} for row in reversed(rows)] + [dict(force=0.0, indentation=9.0, contact_radius=0.0, leg=1)]
+    rows += [row | {"leg": 1} for row in reversed(rows)] + [
+        rows_of(closed.sphere_contact(np.zeros(1), RADIUS, MODULUS), 1)[0] | {"indentation": 9.0}
+    ]
     loop = {"pull_off_pressure": 1.0, "hysteresis_loss": 0.0, "largest_contact_area_fraction": 0.1}
     return loop_values(rows, loop, SMOOTH, icha.Material(MODULUS, ENERGY, interaction_range))
 
@@ -102,6 +129,7 @@ def test_states_that_go_back_to_a_target_inside_a_jump_are_not_loading():
 def test_a_run_states_why_it_has_no_fit(reach, count, reason):
     states = closed.sphere_contact(np.linspace(9e-6, 1.2e-5, count), RADIUS, MODULUS, ENERGY)
     columns = {name: ("step", values) for name, values in states._asdict().items()} | {"leg": ("step", [0] * count)}
+    columns["dissipated_by_front"] = "step", np.zeros(count)
     tabor = {"interaction_range": (RADIUS * (ENERGY / MODULUS) ** 2) ** (1 / 3) / reach}
     known = {"shape_radius": RADIUS, "contact_modulus": MODULUS, "surface_energy": ENERGY} | tabor
     run = xr.Dataset(columns | known | {"pull_off_force_over_jkr": 1.0})
