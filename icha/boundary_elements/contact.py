@@ -266,7 +266,7 @@ class BoundaryElements(FullContactProblem):
     def energetic_area_fraction(self, state: CellState) -> float:
         """Return the energy of adhesion of a state divided by that of full contact.
 
-        At a short range, it is the adhesive area; without adhesion, the contact area.
+        At a short range, it is the adhesive area; without adhesion, the area of whole cells in contact.
         """
         areas = self.attraction.energetic_areas(state.cells, state.fraction, state.mean_fraction)
         return float(np.sum(areas)) / self.count

@@ -150,7 +150,7 @@ MODELS = {
                 ("step",),
                 "1",
                 "energy of adhesion divided by that of full contact; at a finite range of attraction, the integral of "
-                "(1 - gap/range)^2 over the nominal area",
+                "(1 - gap/range)^2 over the nominal area; without adhesion, the area of whole cells in contact",
                 "float64",
             ),
             "layer_compression": (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import itertools
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from icha.contact.model import AREA_FRACTION as CONTROLLED_AREA
@@ -291,10 +291,18 @@ class Path:
         rows = {QUANTITIES[self.targets[0].kind].plural.replace("_", " "): targets, "unload": str(self.unload)}
         return html_table("Path", rows | {"control": self.control})
 
-    def within_asperity_range(self) -> Path:
-        """Return a copy without reduced pressures and areas outside `ASPERITY_RANGES`; turning points always stay."""
+    def within_asperity_range(self, pressure_units: Mapping[str, float]) -> Path:
+        """Return a copy without loads and areas outside `ASPERITY_RANGES`; turning points always stay.
+
+        pressure_units : load at a reduced pressure of 1, by kind of the load.
+        """
         path, ranges = copy.copy(self), ASPERITY_RANGES
-        within = (t for t in self.targets if t.kind not in ranges or ranges[t.kind].contains(t.value))
+        within = (
+            t
+            for t in self.targets
+            if (t.kind not in ranges or ranges[t.kind].contains(t.value))
+            and t.value <= MAX_REDUCED_PRESSURE * pressure_units.get(t.kind, math.inf)
+        )
         vars(path).update(targets=tuple(within))
         return path
 

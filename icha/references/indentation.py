@@ -25,7 +25,8 @@ from scipy.special import struve
 
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
-from icha.surfaces.shapes import Cone, CylinderPunch, FlatPunch, Shape, Wave
+from icha.support.formatting import format_quantity
+from icha.surfaces.shapes import Cone, CylinderPunch, FlatPunch, Paraboloid, Shape, Wave
 
 HERTZ = "H. Hertz, J. Reine Angew. Math. 92 (1882) 156; K. L. Johnson, Contact Mechanics, Cambridge 1985, chapter 4"
 JOHNSON_KENDALL_ROBERTS = (
@@ -189,12 +190,16 @@ def pull_off_state(shape: Shape, contact_modulus, work_of_adhesion) -> ContactSt
 
 
 def theory_of(shape: Shape, *, adhesive: bool) -> str:
-    """Return the authors of the theory by which `contact_radius_at` describes a shape."""
+    """Return the theory by which `contact_radius_at` describes a shape: its authors, and what the shape counts as."""
     if isinstance(shape, (CylinderPunch, FlatPunch)):
-        return "Kendall" if adhesive else "Boussinesq"
+        counts_as = " (as a round end whose radius is half the side)" if isinstance(shape, FlatPunch) else ""
+        return ("Kendall" if adhesive else "Boussinesq") + counts_as
     if isinstance(shape, Cone):
         return "Maugis and Barquins" if adhesive else "Sneddon"
-    return "JKR" if adhesive else "Hertz"
+    counts_as = ""
+    if isinstance(shape, Paraboloid) and shape.radii[0] != shape.radii[1]:
+        counts_as = f" (as a sphere of radius {format_quantity(shape.sphere_radius, 'm')})"
+    return ("JKR" if adhesive else "Hertz") + counts_as
 
 
 def punch_force(indentation, punch_radius, contact_modulus):

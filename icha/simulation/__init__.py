@@ -20,7 +20,7 @@ from icha.path.energy_balance import summarise_loop
 from icha.path.targets import Path
 from icha.references.indenter_runs import loop_values
 from icha.references.limits import doubts
-from icha.simulation.arguments import check_arguments, describe_unusual
+from icha.simulation.arguments import check_arguments, describe_unusual, pressure_units
 from icha.simulation.record import PathRecord, count_uphill_jumps_in, record_path
 from icha.simulation.run_dataset import run_dataset
 from icha.support.rules import IntegerRange
@@ -136,7 +136,7 @@ def _compute(solver, surface, material, path, model, seed, progress, kept):
         observables = contact.observables(surface)
         if kept is not None:
             contact = solver.resumable(contact, kept)
-        reachable = path.within_asperity_range() if MODELS[model].by_summits else path
+        reachable = path.within_asperity_range(pressure_units(surface, material)) if MODELS[model].by_summits else path
         record = record_path(contact, observables, path, reachable, progress)
         loading = [step["mean_separation"] for step in record.steps if step["leg"] == 0]
         reasons = observables.reasons_against(loading, record.pressed) + reasons_of_edges(surface, record.steps)

@@ -50,24 +50,29 @@ def check_arguments(surface, material, path, by_summits):
     for target in (*path.targets, *path.turning_points, *path.unloading_snapshots):
         if target in limited and target.kind in ASPERITY_RANGES and target.value > 0:
             ASPERITY_RANGES[target.kind].validate(f"path: {target.kind}", target.value)
-        _check_target(surface, material, target, by_summits)
+        _check_target(surface, material, target, by_summits, target in limited)
         if target.needs_adhesion and not material.surface_energy and (target.value < 0 or target in path.targets):
             raise ValueError(f"path: {target.describe()} {WITHOUT_ADHESION}")
 
 
-def _check_target(surface, material, target, by_summits):
+def pressure_units(surface: Surface, material: Material) -> dict[str, float]:
+    """Return the load at a reduced pressure of 1, for each kind of load, in its SI unit."""
+    unit = material.contact_modulus * surface.unit_slope
+    return {RELATIVE_LOAD: surface.unit_slope, NOMINAL_PRESSURE: unit, FORCE: unit * surface.period**2}
+
+
+def _check_target(surface, material, target, by_summits, limited):
     """Raise `ValueError` for a load that is too small or too large, a large radius, or a snapshot far above contact."""
     place = f"path: {target.snapshot_kind} = {target.value!r} {UNITS.get(target.kind, '')}".rstrip()
-    modulus = material.contact_modulus
-    units = {RELATIVE_LOAD: 1.0, NOMINAL_PRESSURE: modulus, FORCE: modulus * surface.period**2}
+    units = pressure_units(surface, material)
     if target.kind in units:
-        pressure, load = target.value / (units[target.kind] * surface.unit_slope), f"{place} on a surface of rms slope"
+        pressure, load = target.value / units[target.kind], f"{place} on a surface of rms slope"
         if 0 < abs(pressure) < LEAST_PRESSURE:
             raise ValueError(
                 f"{load} {surface.unit_slope:.4g} is too small; expected a reduced pressure of at least "
                 f"{LEAST_PRESSURE} in absolute value, or 0 at a turning point that ends unloading"
             )
-        if by_summits and pressure > MAX_REDUCED_PRESSURE:
+        if limited and pressure > MAX_REDUCED_PRESSURE:
             raise ValueError(
                 f"{load} {surface.unit_slope:.4g} is beyond the range of the asperity model; expected a reduced "
                 f"pressure of at most {MAX_REDUCED_PRESSURE}"

@@ -128,7 +128,7 @@ def _surface_values(surface: Surface, material: Material, seed: int) -> dict:
     wavelength, estimated = shortest_wave(surface)
     # Pressure in full contact at zero load, for E* = 1. Half its work on the heights is the elastic energy.
     pressure = full_contact_pressure(surface.heights, surface.period, free=surface.free, softness=softness_of(material))
-    complete = -float(pressure.min()) * material.contact_modulus
+    complete = 0.0 - float(pressure.min()) * material.contact_modulus  # not -0.0 for a smooth shape
     energy = float(np.vdot(surface.heights, pressure)) / (2 * pressure.size)
     return {
         **get_values(material, *MATERIAL, "flaw_radius"),

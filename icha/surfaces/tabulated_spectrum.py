@@ -18,6 +18,7 @@ from icha.support.atomic_files import whole_file
 from icha.support.rules import LENGTH
 from icha.support.tables import check_lengths, is_number, positive_numbers, read_rows
 from icha.support.titles import bracketed_texts, power_of_length, problem_with_numbers
+from icha.support.units import conversion_factor
 from icha.surfaces.moments import radial_power_spectrum
 from icha.surfaces.spectrum import IsotropicSpectrum
 from icha.surfaces.surface import Surface
@@ -159,7 +160,7 @@ CONVENTIONS = {
 
 
 def read_spectrum_table(
-    path: str | os.PathLike, length_unit: float | None = None, convention: str | None = None
+    path: str | os.PathLike, length_unit: float | str | None = None, convention: str | None = None
 ) -> SpectrumTable:
     """Read a table of wave numbers and power spectral densities from a text file with two columns.
 
@@ -169,8 +170,8 @@ def read_spectrum_table(
     Parameters
     ----------
     path : file with blanks, tabs, commas or semicolons between the columns.
-    length_unit : unit of length of the table, m: q is in rad per unit, C in the fourth power of the unit (third power
-        for profiles). Default: the units of the titles, or m.
+    length_unit : unit of length of the table, in m or as text, such as "um": q is in rad per unit, C in the fourth
+        power of the unit (third power for profiles). Default: the units of the titles, or m.
     convention : a name of `CONVENTIONS`; default: "surface".
 
     Raises
@@ -187,7 +188,7 @@ def read_spectrum_table(
     if len(rows) < 2:
         raise ValueError(f"has {len(rows)} rows; expected at least two rows of a wave number and a power")
     check_lengths(rows, 2)
-    unit = length_unit or 1.0
+    unit = float(conversion_factor(length_unit, "m")) if isinstance(length_unit, str) else length_unit or 1.0
     chosen = CONVENTIONS[convention or "surface"]
     per_length, power_unit = 1 / unit, unit ** (chosen.dimension + 2)
     if units := _units_of(words, remarks):
