@@ -25,7 +25,9 @@ include: "workflow/rules/common.smk"
 
 # The stamp of a file decides whether the file is valid. Snakemake computes missing files, so outdated files are removed.
 if workflow.is_main_process:
-    campaign = prepare.Results(RESULTS, CONFIGURATION.origin, STAMPS, dry_run=workflow.output_settings.dryrun)
+    needed = needed_files(FILES, prepare.targets_of(sys.argv))
+    stamps = {path: stamp for path, stamp in STAMPS.items() if path in needed}
+    campaign = prepare.Results(RESULTS, CONFIGURATION.origin, stamps, dry_run=workflow.output_settings.dryrun)
 
 
 include: "workflow/rules/inputs.smk"
@@ -66,43 +68,43 @@ localrules:
     deposit,
 
 
-# Targets name all results that they depend on, so that lost or renamed results are computed again.
+# Snakemake does not miss the input of a job that need not run. So targets name all surfaces and runs that have been lost
+# since the analysis.
+LOST = [path for path in STAMPS if os.path.exists(FILES.dataset) and not os.path.exists(path)]
+
+
 rule all:
     default_target: True
     input:
         FILES.configuration,
         list(COPIED),
-        FILES.computed,
+        as_outputs(LOST),
+        FILES.analysed,
+        FILES.verdict,
         FILES.checksums,
+        FILES.figures,
+        FILES.report,
 
 
 rule surfaces:
     input:
-        list(FILES.surfaces),
+        as_it_is(list(FILES.surfaces)),
 
 
 rule runs:
     input:
-        list(FILES.surfaces),
-        list(FILES.runs),
+        as_it_is([*FILES.surfaces, *FILES.runs]),
 
 
 rule references:
     input:
-        list(FILES.surfaces),
-        list(FILES.theories),
+        as_it_is([*FILES.surfaces, *FILES.theories]),
 
 
 rule dataset:
     input:
-        rules.runs.input,
-        FILES.dataset,
-        FILES.table,
-        FILES.comparison,
-        FILES.model_error,
-        FILES.answers,
-        FILES.sensitivity,
-        FILES.checks,
+        as_outputs(LOST),
+        FILES.analysed,
         FILES.verdict,
         FILES.checksums,
 
@@ -114,6 +116,7 @@ rule figures:
 
 rule report:
     input:
+        as_outputs(LOST),
         FILES.report,
 
 

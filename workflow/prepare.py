@@ -12,7 +12,7 @@ from snakemake.logging import logger
 
 from icha.configuration.errors import ConfigurationError
 from icha.configuration.load import Configuration, load_configuration
-from icha.datasets.stamp import Stamp, outdated
+from icha.datasets.stamp import OTHER_LICENCE, Stamp, outdated, state_licence
 from icha.planning.ownership import claim, find_conflict
 from icha.support.atomic_files import is_left_over, probe_folder
 from icha.support.formatting import format_count, printable, printable_lines
@@ -24,6 +24,12 @@ REPORTING = re.compile(
     "--(touch|report|summary|detailed-summary|list.*|l[ciptu]|dag|rulegraph|filegraph|d3dag|lint|archive|unlock|delete.*|"
     "cleanup-metadata|cm|containerize|generate-unit-tests|print-compilation|conda-c.*|list-conda-envs)|-[tlSD]"
 )
+TARGET = re.compile("all|surfaces|runs|references|dataset|figures|report|publish|results/.*")
+
+
+def targets_of(arguments: list[str]) -> list[str]:
+    """Return the targets on a command line. Snakemake itself names them only after it has read the workflow."""
+    return [argument for argument in arguments[1:] if TARGET.fullmatch(argument)]
 
 
 def read_configuration(workflow, root: str) -> Configuration:
@@ -81,6 +87,10 @@ class Results:
             wrong = dict(outdated(stamps))
         except OSError as error:
             raise SystemExit(f"{folder}: results cannot be read: {error}. Nothing was computed.") from None
+        relicensed = [path for path, reason in wrong.items() if reason == OTHER_LICENCE]
+        if relicensed:
+            logger.warning(f"other licence, will be stated without computing: {format_count(len(relicensed), 'file')}")
+        wrong = {path: reason for path, reason in wrong.items() if reason != OTHER_LICENCE}
         if wrong:
             first, reason = next(iter(wrong.items()))
             others = f" and {format_count(len(wrong) - 1, 'more result')}" if len(wrong) > 1 else ""
@@ -89,6 +99,9 @@ class Results:
             for path in wrong:
                 with _report_unwritable(os.path.dirname(path)):
                     os.unlink(path)
+            for path in relicensed:
+                with _report_unwritable(os.path.dirname(path)):
+                    state_licence(path, stamps[path]["license"])
 
     def begin(self) -> None:
         """Prepare the folder before the first job starts.

@@ -128,10 +128,10 @@ class Campaign(Section):
         return list(self._runs[study])
 
     def contacts(self, study: str) -> list[RunLabels]:
-        """Return one run of a study for each surface, seed, slope and material; further models do not count."""
-        found: dict[RunLabels, RunLabels] = {}
+        """Return the first run of a study for each surface, slope and material; other seeds and models do not count."""
+        found: dict[tuple, RunLabels] = {}
         for run in self._runs[study]:
-            found.setdefault(run._replace(model=""), run)
+            found.setdefault((run.surface, run.rms_slope, run.material), run)
         return list(found.values())
 
     def with_runs(self, runs: Mapping[str, Iterable[RunLabels]]) -> Campaign:

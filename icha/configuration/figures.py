@@ -198,10 +198,9 @@ class RunFigure(TopographyFigure):
 
     def run(self, campaign: Campaign) -> RunLabels:
         """Return the first run that fits the options; a run with adhesion is preferred."""
-        model = first_model(campaign.studies[self.study].models)
         wanted = self.model_dump(include=set(RunLabels._fields), exclude_none=True)
-        runs = [contact._replace(model=model) for contact in campaign.contacts(self.study)]
-        runs = [run for run in runs if wanted.items() <= run._asdict().items()]
+        wanted["model"] = first_model(campaign.studies[self.study].models)
+        runs = [run for run in campaign.runs(self.study) if wanted.items() <= run._asdict().items()]
         return next((run for run in runs if campaign.materials[run.material].surface_energy > 0), runs[0])
 
 

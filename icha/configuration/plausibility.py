@@ -294,8 +294,7 @@ def sticky_runs(campaign: Campaign) -> Iterator[Unusual]:
     for name, study in campaign.studies.items():
         if DEFAULT_MODEL not in study.models:
             continue
-        contacts = {contact._replace(seed=0): contact for contact in campaign.contacts(name)}
-        ratios = {contact: energy_ratio(campaign, contact) for contact in contacts.values()}
+        ratios = {contact: energy_ratio(campaign, contact) for contact in campaign.contacts(name)}
         lowest = min(ratios, key=ratios.get)
         if ratios[lowest] < FULL_CONTACT_BELOW:
             source = f" for {lowest.material} on {lowest.surface} at rms slope {lowest.rms_slope:.3g}"

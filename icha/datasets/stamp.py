@@ -5,9 +5,11 @@ The stamps that a campaign expects are in `icha.planning.results.expected_stamps
 """
 
 import os
+import shutil
 from collections.abc import Iterable, Iterator, Mapping
 
 from icha.contact.models import MODELS
+from icha.support.atomic_files import whole_file
 from icha.support.fingerprint import fingerprint
 from icha.support.input_files import text
 
@@ -20,6 +22,8 @@ Stamp = Mapping[str, str]
 DAMAGED = "it cannot be read"
 OTHER_SETTINGS = "it was computed with other settings"
 OTHER_PROGRAM = "it was computed by another version of the program"
+# Not a reason to compute a file again; `state_licence` is enough.
+OTHER_LICENCE = "it states another licence"
 
 # Largest number of files in a message.
 _MOST_NAMES = 20
@@ -90,7 +94,8 @@ def difference(found: Stamp | None, stamp: Stamp) -> str:
     if found is None:
         return DAMAGED
     differing = [name for name in NAMES if found.get(name) != stamp[name]]
-    return "" if not differing else OTHER_PROGRAM if differing == ["program_sha256"] else OTHER_SETTINGS
+    other = {(): "", ("program_sha256",): OTHER_PROGRAM, ("license",): OTHER_LICENCE}
+    return other.get(tuple(differing), OTHER_SETTINGS)
 
 
 def outdated(expected: Mapping[str, Stamp]) -> Iterator[tuple[str, str]]:
@@ -98,6 +103,16 @@ def outdated(expected: Mapping[str, Stamp]) -> Iterator[tuple[str, str]]:
     for path, stamp in expected.items():
         if os.path.exists(path) and (reason := why_outdated(path, stamp)):
             yield path, reason
+
+
+def state_licence(file: str | os.PathLike, licence: str) -> None:
+    """Replace the licence that a file states; the values of the file stay."""
+    import netCDF4  # imported here because the import is slow
+
+    with whole_file(file) as temporary:
+        shutil.copyfile(file, temporary)
+        with netCDF4.Dataset(temporary, "a") as data:
+            data.license = licence
 
 
 def refuse_outdated(expected: Mapping[str, Stamp]) -> None:

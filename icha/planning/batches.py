@@ -1,13 +1,14 @@
 """Batches: short computations that one job of Snakemake does one after the other.
 
-Starting a job takes longer than most runs. So the runs of a batch together take about `icha.planning.costs.BATCH`, and
-a run that takes longer is a batch of its own. The runs of a batch have the same study and model. They are in the order
-of the seeds, so that a new seed at the end of the list changes only the last batch. Measured times have no effect,
-because the batches of finished results must stay the same.
+Starting a job takes longer than most computations. So the computations of a batch together take about
+`icha.planning.costs.BATCH`, and one that takes longer is a batch of its own. The runs of a batch have the same study
+and model. They are in the order of the seeds, and a batch depends only on the files before it. So a new seed at the end
+of the list changes only the last batch. Measured times have no effect, because the batches of finished results must
+stay the same.
 """
 
-import math
 from collections.abc import Callable, Iterable, Mapping
+from functools import cache
 from typing import NamedTuple, TypeVar
 
 from icha.configuration.campaign import Campaign
@@ -17,22 +18,23 @@ from icha.planning import costs
 from icha.planning.requirements import is_resumable, run_threads, surface_threads
 from icha.planning.run_costs import run_costs
 
-# Smallest number of batches of a group, unless they would be shorter than a fifth of `costs.BATCH`.
-_FEWEST = 4
-# Largest number of figures in a batch.
-_MOST_FIGURES = 6
+# The first batches of a group are shorter, so that several cores share a small group: their number, and their length as
+# a part of `costs.BATCH`.
+_SHORT_BATCHES, _SHORT = 4, 0.2
+# Expected time of a figure, s.
+_FIGURE = 1.6
 # Largest number of files in a batch. Snakemake's time for planning is proportional to the number.
 _MOST_FILES = 60
 T = TypeVar("T")
 
 
 class Batch(NamedTuple):
-    """Files that one job computes.
+    """Files, or names of figures, that one job computes.
 
     Attributes
     ----------
     name : name of the batch; names differ among the batches of one kind of file.
-    files : paths of the files.
+    files : paths of the files, or names of the figures.
     seconds : expected time of the computations, s.
     """
 
@@ -57,22 +59,22 @@ def theory_batches(theories: Mapping[str, str]) -> list[Batch]:
 def run_batches(campaign: Campaign, runs: Mapping[str, RunLabels]) -> list[Batch]:
     """Return the batches of runs; `runs` has the labels of each run by path. A run that can resume is alone."""
     cost_of = run_costs(campaign)
+
+    @cache
+    def group_and_seconds(contact):
+        seconds = costs.BATCH if is_resumable(campaign, contact) else 0.0
+        return f"{contact.study}_{contact.model}{_large(run_threads(campaign, contact))}", seconds
+
     return _divide(
-        (
-            path,
-            f"{case.study}_{case.model}{_large(run_threads(campaign, case))}",
-            max(cost_of[case].seconds, costs.BATCH * is_resumable(campaign, case)),
-        )
+        (path, group, max(cost_of[case].seconds, seconds))
         for path, case in _by_seed(runs, lambda case: (case.study, case.seed))
+        for group, seconds in [group_and_seconds(case._replace(seed=0))]
     )
 
 
-def figure_batches(names: Iterable[str]) -> list[list[str]]:
-    """Return the names of figures by batch. An own figure is alone, because its script may fail."""
-    numbered = [name for name in names if figure_number(name)]
-    count = max(_FEWEST // 2, math.ceil(len(numbered) / _MOST_FIGURES))
-    batches = [numbered[k::count] for k in range(count)]
-    return [*filter(None, batches), *([name] for name in names if not figure_number(name))]
+def figure_batches(names: Iterable[str]) -> list[Batch]:
+    """Return the batches of figures, by name. An own figure is alone, because its script may fail."""
+    return _divide((name, "figures" if figure_number(name) else f"figure_{name}", _FIGURE) for name in names)
 
 
 def _by_seed(files: Mapping[str, T], labels: Callable[[T], tuple[str, int]]) -> list[tuple[str, T]]:
@@ -101,11 +103,9 @@ def _divide(files: Iterable[tuple[str, str, float]]) -> list[Batch]:
         groups.setdefault(group, []).append((path, seconds))
     batches = []
     for group, members in groups.items():
-        # The batches of a small group are shorter, so that several cores share the group.
-        total = sum(seconds for _, seconds in members)
-        longest = min(costs.BATCH, max(costs.BATCH / 5, total / _FEWEST))
         of_group: list[Batch] = []
         for path, seconds in members:
+            longest = costs.BATCH * (_SHORT if len(of_group) <= _SHORT_BATCHES else 1)
             if not of_group or of_group[-1].seconds + seconds > longest or len(of_group[-1].files) == _MOST_FILES:
                 of_group.append(Batch(f"{group}_{len(of_group)}", [], 0.0))
             last = of_group[-1]

@@ -11,12 +11,12 @@ from icha.configuration.campaign import Campaign
 from icha.configuration.cases import campaign_sha256
 from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets.attributes import why_failed
-from icha.datasets.stamp import difference, read_stamp
+from icha.datasets.stamp import OTHER_LICENCE, difference, read_stamp
 from icha.datasets.variables.campaign import STATUS_ATTRIBUTES
 from icha.planning import costs
 from icha.planning.measured_times import correct_costs
 from icha.planning.requirements import largest_grid, run_threads, surface_threads
-from icha.planning.results import campaign_files, expected_stamps
+from icha.planning.results import NEEDED, campaign_files, expected_stamps
 from icha.planning.run_costs import run_costs
 from icha.support import formatting
 from icha.support.formatting import format_count
@@ -27,12 +27,9 @@ _MOST_MEMORY = 14e9
 # Parts of a campaign, named as the targets of the workflow, and the parts that these targets need.
 SURFACES, RUNS, THEORIES = "surfaces", "runs", "references"
 ANALYSIS, FIGURES, REPORT = "dataset", "figures", "report"
-_NEEDED = {
-    SURFACES: {SURFACES},
-    RUNS: {SURFACES, RUNS},
-    THEORIES: {SURFACES, THEORIES},
-    ANALYSIS: {SURFACES, RUNS, ANALYSIS},
-    FIGURES: {SURFACES, RUNS, THEORIES, ANALYSIS, FIGURES},
+_NEEDED = NEEDED | {
+    ANALYSIS: [SURFACES, RUNS, ANALYSIS],
+    FIGURES: [SURFACES, RUNS, THEORIES, ANALYSIS, FIGURES],
 }
 
 
@@ -86,7 +83,7 @@ def needed_for(targets: Iterable[str], items: Iterable[Item]) -> list[Item]:
     names = list(itertools.takewhile(lambda target: not target.startswith("-"), targets)) or ["all"]
 
     def is_needed(item, name):
-        return name.endswith(item.path) if "/" in name else item.part in _NEEDED.get(name, {item.part})
+        return name.endswith(item.path) if "/" in name else item.part in _NEEDED.get(name, [item.part])
 
     return [item for item in items if any(is_needed(item, name) for name in names)]
 
@@ -130,7 +127,7 @@ def _states(campaign: Campaign, results: Path) -> Callable[[str], tuple[str, str
             found = read_stamp(results / path, STATUS_ATTRIBUTES.values())
         except FileNotFoundError:
             return TO_DO, ""
-        if reason := difference(found, stamps[path]):
+        if (reason := difference(found, stamps[path])) not in ("", OTHER_LICENCE):
             return OUTDATED, reason
         reason = why_failed(found)
         return (FAILED, reason) if reason else (DONE, found.get("beyond_model", ""))

@@ -1,5 +1,6 @@
 """List all files of a campaign, with the labels of their contents."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from icha.configuration.campaign import Campaign
@@ -47,22 +48,28 @@ class CampaignFiles:
     @property
     def computed(self) -> list[str]:
         """Paths of all results except the copy of the configuration, the checksums and the deposit."""
-        return [*self.verified, self.checks, self.verdict, *self.figures, self.report]
+        return [*self.verified, self.verdict, *self.figures, self.report]
 
     @property
     def verified(self) -> list[str]:
-        """Paths of all results that are in the list of checksums, except checks and verdict."""
-        return [
-            *self.surfaces,
-            *self.runs,
-            *self.theories,
-            self.dataset,
-            self.table,
-            self.comparison,
-            *self.model_error,
-            *self.answers,
-            *self.sensitivity,
-        ]
+        """Paths of all results that are in the list of checksums, except the verdict."""
+        return [*self.surfaces, *self.runs, *self.theories, *self.analysed]
+
+    @property
+    def analysed(self) -> list[str]:
+        """Paths of the files that the analysis of all runs writes."""
+        further = (*self.model_error, *self.answers, *self.sensitivity)
+        return [self.dataset, self.table, self.comparison, *further, self.checks]
+
+
+# Surfaces, runs and theories that targets of the workflow need, named as the targets; other targets need all of them.
+NEEDED = {"surfaces": ["surfaces"], "runs": ["surfaces", "runs"], "references": ["surfaces", "references"]}
+
+
+def needed_files(files: CampaignFiles, targets: Iterable[str]) -> set[str]:
+    """Return the paths of those surfaces, runs and theories that targets of the workflow may need."""
+    parts = {"surfaces": files.surfaces, "runs": files.runs, "references": files.theories}
+    return {path for target in targets or ["all"] for part in NEEDED.get(target, parts) for path in parts[part]}
 
 
 def campaign_files(campaign: Campaign, folder: str = "") -> CampaignFiles:

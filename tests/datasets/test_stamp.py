@@ -3,8 +3,17 @@
 import pytest
 import small_campaign as small
 
-from icha.datasets.files import write_dataset
-from icha.datasets.stamp import DAMAGED, OTHER_PROGRAM, OTHER_SETTINGS, outdated, read_stamp, refuse_outdated
+from icha.datasets.files import read_run, write_dataset
+from icha.datasets.stamp import (
+    DAMAGED,
+    OTHER_LICENCE,
+    OTHER_PROGRAM,
+    OTHER_SETTINGS,
+    outdated,
+    read_stamp,
+    refuse_outdated,
+    state_licence,
+)
 
 STAMP = {"id": "c/runs/é", "license": "CC0-1.0", "config_sha256": "a" * 64, "program_sha256": "b" * 64}
 
@@ -33,7 +42,8 @@ def replace_by_text(file):
         ({"config_sha256": "0" * 64}, None, OTHER_SETTINGS),
         ({"config_sha256": "0" * 64, "program_sha256": "0" * 64}, None, OTHER_SETTINGS),
         ({"id": "other/runs/e"}, None, OTHER_SETTINGS),
-        ({"license": "CC-BY-4.0"}, None, OTHER_SETTINGS),
+        ({"license": "CC-BY-4.0"}, None, OTHER_LICENCE),
+        ({"license": "CC-BY-4.0", "program_sha256": "0" * 64}, None, OTHER_SETTINGS),
         ({"program_sha256": "0" * 64}, None, OTHER_PROGRAM),
         ({}, cut_off, DAMAGED),
         ({}, replace_by_text, DAMAGED),
@@ -56,6 +66,14 @@ def test_a_file_without_stamp_is_outdated(tmp_path):
     write_dataset(run, tmp_path / "run.nc")
     assert not any(read_stamp(tmp_path / "run.nc").values())
     assert dict(outdated({str(tmp_path / "run.nc"): STAMP})) == {str(tmp_path / "run.nc"): OTHER_SETTINGS}
+
+
+def test_a_file_states_another_licence_with_the_same_values(file):
+    before = read_run(file).load()
+    state_licence(file, "CC-BY-4.0")
+    refuse_outdated({file: STAMP | {"license": "CC-BY-4.0"}})
+    after = read_run(file).load()
+    assert after.attrs == before.attrs | {"license": "CC-BY-4.0"} and after.equals(before)
 
 
 def test_a_missing_file_has_no_stamp(tmp_path):

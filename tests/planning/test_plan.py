@@ -8,11 +8,11 @@ import yaml
 from conftest import REPOSITORY
 
 from icha.configuration.load import load_configuration
-from icha.planning.batches import run_batches
+from icha.planning.batches import figure_batches, run_batches
 from icha.planning.costs import BATCH, JOB, START, WORKFLOW_MEMORY, Cost
 from icha.planning.plan import DONE, RUNS, TO_DO, Item, find_shortages, memory_on, needed_for, plan, time_on
 from icha.planning.requirements import is_resumable, run_threads
-from icha.planning.results import campaign_files
+from icha.planning.results import campaign_files, needed_files
 from icha.planning.validity import surface_facts
 from icha.surfaces.measured.topography import prepared_topography
 from icha.surfaces.summits import find_summits
@@ -91,6 +91,36 @@ def test_targets_need_a_part_of_the_files(campaign, tmp_path):
     assert files.dataset in {item.path for item in needed_for(["dataset"], items)}
     assert [item.path for item in needed_for([f"results/scanned/{files.report}"], items)] == [files.report]
     assert needed_for([], items) == needed_for(["--forceall"], items) == needed_for(["runs", "all"], items) == items
+
+
+def test_targets_need_a_part_of_the_surfaces_runs_and_theories(campaign):
+    files = campaign_files(campaign)
+    assert needed_files(files, ["surfaces"]) == {*files.surfaces}
+    assert needed_files(files, ["references", "runs"]) == {*files.surfaces, *files.runs, *files.theories}
+    for targets in ([], ["all"], ["surfaces", files.report]):
+        assert needed_files(files, targets) == {*files.surfaces, *files.runs, *files.theories}
+
+
+def test_new_seeds_at_the_end_change_only_the_last_batch(tmp_path):
+    content = yaml.safe_load(CAMPAIGN) | {"figures": {}, "confirmed": []}
+    before = []
+    for seeds in (3, 40, 41, 400):
+        content["studies"]["load"] |= {"surfaces": ["rough"], "seeds": f"1..{seeds}"}
+        (tmp_path / "seeds.yaml").write_text(yaml.safe_dump(content))
+        campaign = load_configuration(tmp_path / "seeds.yaml").campaign
+        batches = run_batches(campaign, campaign_files(campaign).runs)
+        assert batches[: len(before) - 1] == before[:-1] and all(batch.seconds <= BATCH for batch in batches)
+        assert sum(len(batch.files) for batch in batches) == 2 * seeds
+        before = batches
+    # Several cores share a small group.
+    assert before[0].seconds <= BATCH / 5 < before[-2].seconds
+
+
+def test_figures_are_drawn_in_batches_and_own_figures_alone():
+    names = [f"fig{k}_one" for k in range(1, 8)] + ["mine", "other"]
+    batches = [batch.files for batch in figure_batches(names)]
+    assert [name for batch in batches for name in batch] == names and batches[-2:] == [["mine"], ["other"]]
+    assert len(batches) == 3 + 2
 
 
 def test_measured_times_of_a_batch_correct_the_times_of_its_study(campaign, tmp_path):

@@ -12,7 +12,7 @@ import xarray as xr
 from conftest import REPOSITORY
 
 from icha.datasets.files import write_dataset
-from icha.datasets.stamp import NAMES
+from icha.datasets.stamp import NAMES, read_stamp
 from icha.datasets.surface_file import read_surface
 from icha.support.checksums import sha256_of
 from icha.surfaces.shapes import make_shape
@@ -75,7 +75,9 @@ def batch(monkeypatch, tmp_path):
         stamps = [dict.fromkeys(NAMES, "same") | {"program_sha256": program} for program in programs]
         arguments = [{"attributes": stamp} for stamp in stamps]
         try:
-            compute_batch(outputs, arguments, task, lambda each: present or each["attributes"]["program_sha256"])
+            compute_batch(
+                outputs, arguments, task, lambda each: present or each["attributes"]["program_sha256"], "same"
+            )
         except OSError:
             computed.append("failed")
         return computed
@@ -145,6 +147,19 @@ def test_outdated_files_are_removed_if_jobs_will_run(arguments, dry_run, removed
             lock.close()
         prepare.Results(*results, {path: stamp | {"config_sha256": "other"}}, dry_run=dry_run)
         assert Path(path).exists() != removed
+
+
+def test_another_licence_is_stated_without_computing(prepare):
+    for path, stamp in STAMPS.items():
+        Path(path).parent.mkdir(parents=True)
+        write_dataset(DATASET.assign_attrs(stamp), path)
+        prepare.Results("results/tiny", "tiny.yaml", {path: stamp | {"license": "CC0-1.0"}})
+        assert read_stamp(path) == stamp | {"license": "CC0-1.0"}
+
+
+def test_targets_are_found_among_the_arguments_of_snakemake(prepare):
+    arguments = ["snakemake", "--cores", "2", "runs", "--configfile", "config/all.yaml", "results/tiny/report.html"]
+    assert prepare.targets_of(arguments) == ["runs", "results/tiny/report.html"]
 
 
 @pytest.mark.parametrize("link", [True, False])

@@ -1,5 +1,7 @@
 # Analysis of all runs: the campaign dataset (one group for each study), its table, the comparison of runs at common
 # loads, the error of the asperity model, estimates with intervals, sampled parameters, and checks. Then the verdict.
+# The verdict and the report read surfaces, too. They come after the analysis, which needs all surfaces and runs, so they
+# need not list those: Snakemake's time for planning is proportional to the number of all inputs.
 
 from icha.configuration.cases import campaign_sha256
 from icha.configuration.design import sampled_parameters, varied_values
@@ -9,7 +11,8 @@ CONFIG_SHA256 = {case: STAMPS[path]["config_sha256"] for path, case in FILES.run
 
 rule analyse:
     input:
-        list(FILES.runs),
+        as_outputs(FILES.surfaces),
+        as_outputs(FILES.runs),
     output:
         dataset=FILES.dataset,
         table=FILES.table,
@@ -34,7 +37,7 @@ rule analyse:
         varied=as_it_is(varied_values(CAMPAIGN)),
         samples=as_it_is(sampled_parameters(CAMPAIGN)),
         number=len(FILES.runs),
-        attributes=as_it_is(ATTRIBUTES),
+        attributes=as_it_is({"campaign": CAMPAIGN.name, "license": PUBLICATION.license}),
         described=as_it_is(
             {
                 "title": CAMPAIGN.title,
@@ -52,8 +55,8 @@ rule analyse:
 # A failed check stops the campaign here. The report, which shows all checks, is written in any case.
 rule verdict:
     input:
-        checks=FILES.checks,
-        others=FILES.verified,
+        FILES.checks,
+        as_outputs(FILES.theories),
     output:
         verdict=FILES.verdict,
         checksums=FILES.checksums,

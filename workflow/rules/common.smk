@@ -13,7 +13,7 @@ from icha.configuration.load import collect_inputs
 from icha.datasets.results import SURFACE
 from icha.planning.batches import run_batches, surface_batches, theory_batches
 from icha.planning.requirements import is_resumable
-from icha.planning.results import campaign_files, expected_stamps
+from icha.planning.results import campaign_files, expected_stamps, needed_files
 from icha.support.checksums import LongList, sha256_of
 from icha.support.fingerprint import fingerprint
 
@@ -33,14 +33,23 @@ COPIED = {copy: file for copy, file in INPUTS.items() if Path(copy).resolve() !=
 # The surface file from which the theories of a surface are computed, by the name of the surface.
 FIRST_SURFACES = dict(reversed([(name, path) for path, (name, _) in FILES.surfaces.items()]))
 
-# Attributes of every dataset.
-ATTRIBUTES = {"campaign": CAMPAIGN.name, "license": PUBLICATION.license}
+# Outputs of the rules of batches, by path.
+MADE = {}
+
+# The jobs of batches read the licence from Snakemake's `config`, which is no parameter of a job, because a new licence
+# computes nothing again (workflow/prepare.py).
+config["license"] = PUBLICATION.license
 
 
 pathvars:
     results=RESULTS,
     logs=f"{RESULTS}/logs",
     benchmarks=f"{RESULTS}/benchmarks",
+
+
+def attributes_of(path):
+    """Return the attributes of a surface, run or file of theories, without the licence."""
+    return {"campaign": CAMPAIGN.name} | {name: text for name, text in STAMPS[path].items() if name != "license"}
 
 
 def surface_arguments(path):
@@ -53,7 +62,7 @@ def surface_arguments(path):
         "settings": surface_settings(CAMPAIGN, name),
         "height_map": section.path if section.from_file else None,
         "sha256": getattr(topography, "sha256", None),
-        "attributes": ATTRIBUTES | STAMPS[path],
+        "attributes": attributes_of(path),
     }
 
 
@@ -64,7 +73,7 @@ def theory_arguments(path):
         "surface": FIRST_SURFACES[name],
         "settings": surface_settings(CAMPAIGN, name),
         "adhesive": adhesive_contacts(CAMPAIGN, name),
-        "attributes": ATTRIBUTES | STAMPS[path],
+        "attributes": attributes_of(path),
     }
 
 
@@ -78,7 +87,7 @@ def run_arguments(path):
     case = FILES.runs[path]
     return run_settings(CAMPAIGN, case) | {
         "surface": surface_of(case),
-        "attributes": ATTRIBUTES | {"study": case.study} | STAMPS[path],
+        "attributes": attributes_of(path) | {"study": case.study},
         "resumable": is_resumable(CAMPAIGN, case),
     }
 
@@ -89,7 +98,17 @@ def surfaces_for(runs):
     A batch keeps files that exist, so it does not depend on their surfaces. Otherwise, a batch of surfaces that gets a
     new seed would start all jobs that use its other seeds.
     """
-    return list(dict.fromkeys(surface for path, surface in runs.items() if not Path(path).exists()))
+    return as_outputs(dict.fromkeys(surface for path, surface in runs.items() if not Path(path).exists()))
+
+
+def as_outputs(paths):
+    """Return paths as outputs of the rules that make them, so that Snakemake need not compare paths with all rules."""
+    return [MADE.get(path, path) for path in paths]
+
+
+def register(rule):
+    """Note the outputs of the rule of a batch for `as_outputs`."""
+    MADE.update((str(path), path) for path in getattr(rules, rule).output)
 
 
 def as_it_is(value):

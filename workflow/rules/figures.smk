@@ -36,31 +36,31 @@ def given_files(name):
     return [*inputs.get("tables", ()), *scripts, *(file for script in scripts for file in modules_of(script))]
 
 
-for number, names in enumerate(figure_batches(FIGURES)):
+for batch in figure_batches(FIGURES):
 
     rule:
         name:
-            f"draw_figures_{number}"
+            f"draw_{batch.name}"
         input:
-            list(dict.fromkeys(file for name in names for file in input_files(name))),
+            list(dict.fromkeys(file for name in batch.files for file in input_files(name))),
         output:
-            [figure_files(name) for name in names],
+            [figure_files(name) for name in batch.files],
         log:
-            f"<logs>/figures/figures_{number}.log",
+            f"<logs>/figures/{batch.name}.log",
         benchmark:
-            f"<benchmarks>/figures/figures_{number}.jsonl"
+            f"<benchmarks>/figures/{batch.name}.jsonl"
         localrule: True
         conda:
             "../envs/icha.yaml"
         resources:
-            mem_mb=max(figure_memory(CAMPAIGN, holds_topography=FIGURES[name].holds_topography) for name in names),
+            mem_mb=max(figure_memory(CAMPAIGN, holds_topography=FIGURES[name].holds_topography) for name in batch.files),
             runtime=10,
         params:
-            figures=as_it_is(LongList(DRAWINGS[name] for name in names)),
+            figures=as_it_is(LongList(DRAWINGS[name] for name in batch.files)),
             # These files are compared by content, not by time.
-            sha256=as_it_is([sha256_of(Path(file)) for name in names for file in given_files(name)]),
-            code=code_of("draw_figures.py", *map(module_name, names)),
-            names=", ".join(names),
+            sha256=as_it_is([sha256_of(Path(file)) for name in batch.files for file in given_files(name)]),
+            code=code_of("draw_figures.py", *map(module_name, batch.files)),
+            names=", ".join(batch.files),
         message:
             "Figures {params.names}"
         script:

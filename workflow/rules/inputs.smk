@@ -60,6 +60,8 @@ for batch in surface_batches(CAMPAIGN, FILES.surfaces):
         script:
             "../scripts/make_surfaces.py"
 
+    register(f"make_{batch.name}")
+
 
 for batch in theory_batches(FILES.theories):
 
@@ -86,3 +88,5 @@ for batch in theory_batches(FILES.theories):
             "Theories and literature for {params.number} surfaces"
         script:
             "../scripts/make_references.py"
+
+    register(f"compute_{batch.name}")

@@ -12,7 +12,6 @@ rule report_page:
         answers=FILES.answers,
         sensitivity=FILES.sensitivity,
         configuration=FILES.configuration,
-        surfaces=list(FILES.surfaces),
         figures=FILES.figures,
     output:
         page=FILES.report,
@@ -26,6 +25,7 @@ rule report_page:
         mem_mb=4000,
         runtime=10,
     params:
+        surfaces=as_it_is(LongList(FILES.surfaces)),
         citations=as_it_is([measurement.citation for measurement in CAMPAIGN.measurements.values()]),
         code=code_of("make_report.py"),
     message:

@@ -3,7 +3,7 @@
 from icha.planning.requirements import run_memory, run_minutes, run_threads
 
 for batch in run_batches(CAMPAIGN, FILES.runs):
-    cases = [FILES.runs[path] for path in batch.files]
+    cases = {FILES.runs[path]._replace(seed=0) for path in batch.files}
 
     rule:
         name:
@@ -32,3 +32,5 @@ for batch in run_batches(CAMPAIGN, FILES.runs):
             "Runs {params.label}, {params.number} runs"
         script:
             "../scripts/run_batch.py"
+
+    register(f"run_{batch.name}")

@@ -37,7 +37,7 @@ def job_context(snakemake):
         sys.exit(1)
 
 
-def compute_batch(outputs, arguments, task, program):
+def compute_batch(outputs, arguments, task, program, licence):
     """Compute those files of a batch that do not exist with their stamps; print a line for each of them.
 
     Raise ValueError if the program has changed since Snakemake planned the jobs: the stamps would be wrong.
@@ -48,10 +48,12 @@ def compute_batch(outputs, arguments, task, program):
     arguments : keyword arguments of the task for each file; the argument `attributes` contains the stamp.
     task : function that computes one file; its argument `output` is the path of the file.
     program : function that returns the fingerprint of the program from the arguments of a file.
+    licence : licence that the files state; it is no parameter of the job, because a new licence computes no file again.
     """
     if any(program(each) != each["attributes"]["program_sha256"] for each in arguments):
         raise ValueError("the program has changed since the campaign started; repeat the command")
     for number, (output, each) in enumerate(zip(outputs, arguments, strict=True)):
+        each["attributes"]["license"] = licence
         if not os.path.exists(output) or why_outdated(output, each["attributes"]):
             print(f"{number + 1} of {len(outputs)}: {each['attributes']['id']}", flush=True)
             task(output=output, **each)

@@ -39,6 +39,6 @@ def judge_results(checks, output, *, known):
 
 if "snakemake" in globals():
     with job_context(snakemake):
-        inputs, outputs = snakemake.input, snakemake.output
-        judge_results(inputs.checks, outputs.verdict, known=snakemake.params.known)
-        write_checksums(snakemake.params.results, [inputs.checks, *inputs.others, outputs.verdict], outputs.checksums)
+        params, outputs = snakemake.params, snakemake.output
+        judge_results(snakemake.input[0], outputs.verdict, known=params.known)
+        write_checksums(params.results, [*params.files, outputs.verdict], outputs.checksums)

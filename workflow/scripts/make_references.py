@@ -7,4 +7,5 @@ from icha.tasks.theories import make_theories
 
 if "snakemake" in globals():
     with job_context(snakemake):
-        compute_batch(snakemake.output, snakemake.params.files, make_theories, lambda each: program_of_theories())
+        files, licence = snakemake.params.files, snakemake.config["license"]
+        compute_batch(snakemake.output, files, make_theories, lambda each: program_of_theories(), licence)

@@ -31,7 +31,7 @@ if "snakemake" in globals():
             figures=files.figures,
             checks=read_checks(files.checks),
             **{name: read_campaign(path) if path else None for name, path in trees.items()},
-            surfaces=[read_surface_statistics(path) for path in files.surfaces],
+            surfaces=[read_surface_statistics(path) for path in params.surfaces],
             configuration=Path(files.configuration).read_text(encoding="utf-8"),
             files={name: path for name, path in linked.items() if path},
             results=Path(page).parent,

@@ -7,4 +7,5 @@ from icha.tasks.surface import make_surface
 
 if "snakemake" in globals():
     with job_context(snakemake):
-        compute_batch(snakemake.output, snakemake.params.files, make_surface, lambda each: program_of_surfaces())
+        files, licence = snakemake.params.files, snakemake.config["license"]
+        compute_batch(snakemake.output, files, make_surface, lambda each: program_of_surfaces(), licence)

@@ -16,5 +16,5 @@ def program(run):
 
 if "snakemake" in globals():
     with job_context(snakemake):
-        progress = partial(print, flush=True)
-        compute_batch(snakemake.output, snakemake.params.files, partial(compute_run, progress=progress), program)
+        task, licence = partial(compute_run, progress=partial(print, flush=True)), snakemake.config["license"]
+        compute_batch(snakemake.output, snakemake.params.files, task, program, licence)
