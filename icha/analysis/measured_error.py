@@ -4,7 +4,8 @@ import numpy as np
 import xarray as xr
 
 from icha.analysis.left_out import NOT_COMPARED, NOT_REQUESTED, LeftOut, find_left_out
-from icha.analysis.validity import Statement
+from icha.analysis.validity import Statement, statements_on_dataset
+from icha.contact.models import DEFAULT_MODEL
 from icha.datasets.variables.campaign import COMPLETE, NOT_IN_DESIGN
 
 _QUANTITIES = {"area_error": "contact area", "separation_error": "mean separation"}
@@ -32,6 +33,20 @@ def measured_errors(model_error: xr.DataTree) -> dict[str, Statement]:
             "error", f"of the asperity model in study {name}: {ranges} ({among}, boundary elements)"
         )
     return found
+
+
+def statements_on_results(campaign: xr.DataTree, model_error: xr.DataTree | None) -> list[Statement]:
+    """Return statements on the validity of the models, with the measured errors of the asperity model first.
+
+    If all studies with the asperity model have a measured error, the statement on the accuracy on other surfaces is
+    left out. `model_error` is None if no study has both models.
+    """
+    measured = {} if model_error is None else measured_errors(model_error)
+    with_asperities = {name for name, node in campaign.children.items() if DEFAULT_MODEL in node["model"].values}
+    statements = statements_on_dataset(campaign)
+    if with_asperities <= measured.keys():
+        statements = [each for each in statements if each.about != "accuracy"]
+    return [*measured.values(), *statements]
 
 
 def left_out_runs(errors: xr.Dataset) -> LeftOut:

@@ -155,14 +155,6 @@ def read_configuration(path: Path, home: Path | None = None):
     return configuration
 
 
-def read_profile(folder: Path) -> dict:
-    """Read the settings of a Snakemake profile; return an empty dict if the folder has no config.yaml."""
-    import yaml
-
-    file = folder / "config.yaml"
-    return yaml.safe_load(file.read_text(encoding="utf-8")) or {} if file.is_file() else {}
-
-
 def shorten_path(path: Path) -> Path:
     """Shorten a path for printing: a path inside the working directory becomes relative to this directory."""
     path = Path(path)

@@ -4,12 +4,12 @@ import itertools
 import re
 import subprocess
 import sys
-from collections import Counter
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from icha.cli.accuracy import print_accuracy, reach_accuracy
 from icha.cli.describe import print_plan
 from icha.cli.progress import Progress, run_process
 from icha.cli.project import (
@@ -27,7 +27,6 @@ from icha.cli.project import (
     option,
     project,
     read_configuration,
-    read_profile,
     shorten_path,
 )
 from icha.support import formatting
@@ -35,8 +34,6 @@ from icha.support.formatting import format_count, printable
 
 # Largest number of lines that are printed about missing files, failed runs or the output of Snakemake.
 MOST_LINES = 12
-# Largest number of times that the seeds of a study are increased to reach its accuracy.
-_MOST_EXTENSIONS = 2
 
 
 def run(
@@ -79,7 +76,6 @@ def run(
     folder = (folder or project()).resolve()
     campaign = read_configuration(path, folder).campaign
     results = folder / "results" / campaign.name
-    profile_folder = _profile_folder(profile, workflow)
     names = list(itertools.takewhile(lambda target: not target.startswith("-"), targets))
     if unknown := [name for name in names if name not in TARGETS and not name.startswith(f"results/{campaign.name}/")]:
         expected = f"{', '.join(TARGETS)}, or a file under results/{campaign.name}/"
@@ -93,11 +89,10 @@ def run(
         *(["--configfile", str(path.resolve())] if path.resolve() != (workflow / DEFAULT).resolve() else []),
         *(["--cores", str(cores)] if cores else []),
         # Snakemake finds profiles/default without this option.
-        *(["--workflow-profile", str(profile_folder)] if profile else []),
+        *(["--workflow-profile", str(_find_profile(profile, workflow))] if profile else []),
     ]
     cores = cores or DEFAULT_CORES
-    # Jobs of other executors run on other machines.
-    local = profile is None or read_profile(profile_folder).get("executor", "local") == "local"
+    local = profile is None  # with another profile, jobs may run on other machines
     if dry_run:
         jobs = _dry_run([*program, *targets, *options, "--dry-run"], workflow)
         print_plan(path, campaign, folder, cores, local=local)
@@ -113,11 +108,11 @@ def run(
 
     choices = {}
     if every:
-        campaign, choices = _reach_accuracy(campaign, path, folder, cores, compute)
+        campaign, choices = reach_accuracy(campaign, path, folder, cores, compute)
     passed = compute(campaign, targets)
     if every:
         _print_checks(campaign, results)
-        _print_accuracy(choices)
+        print_accuracy(choices)
     if not passed:
         raise typer.Exit(FAILED)
     if "publish" in targets:
@@ -125,9 +120,9 @@ def run(
         echo(f"deposit: {shorten_path(results / 'publish' / f'{campaign.name}-{version}.zip')}")
 
 
-def _profile_folder(profile: str | None, workflow: Path) -> Path:
-    """Find the folder of a Snakemake profile by its path or its name; None means the default profile."""
-    for path in (Path(profile or "default"), workflow / "profiles" / (profile or "default")):
+def _find_profile(profile: str, workflow: Path) -> Path:
+    """Find the folder of a Snakemake profile by its path or its name."""
+    for path in (Path(profile), workflow / "profiles" / profile):
         if (path / "config.yaml").is_file():
             return path.resolve()
     names = sorted(path.parent.name for path in (workflow / "profiles").glob("*/config.yaml"))
@@ -140,10 +135,9 @@ def _dry_run(command: list[str], workflow: Path) -> str:
     if done.returncode:
         _print_lines("Snakemake could not start:", done.stdout.splitlines()[-MOST_LINES:])
         raise typer.Exit(FAILED)
-    table = done.stdout.partition("Job stats:")[2].partition("\ntotal")[0]
-    rows = re.findall(r"^(\w+) +(\d+)$", table, re.MULTILINE)
-    jobs = sum(int(number) for rule, number in rows if rule not in TARGETS)
-    return f"{format_count(jobs, 'job')} would run." if jobs else "Nothing would run: all results are up to date."
+    jobs = re.findall(r"^(\S+) +1$", done.stdout.partition("Job stats:")[2].partition("\ntotal")[0], re.MULTILINE)
+    jobs = [rule for rule in jobs if rule not in TARGETS]
+    return f"{format_count(len(jobs), 'job')} would run." if jobs else "Nothing would run: all results are up to date."
 
 
 def _compute(command: list[str], workflow: Path, campaign, results: Path, targets, cores: int, local: bool) -> bool:
@@ -163,13 +157,13 @@ def _compute(command: list[str], workflow: Path, campaign, results: Path, target
     log = results / "logs/snakemake.log"
     try:
         log.parent.mkdir(parents=True, exist_ok=True)
-        with log.open("a") as output:
-            begin = output.tell()
+        log.touch()
     except OSError as error:
         raise UserError(
             f"cannot write to {results}: {error.strerror}; free some space, change its permissions, or use another "
             "folder: --directory FOLDER"
         ) from None
+    begin = log.stat().st_size
     status, stopped = run_process(command, workflow, log, progress, campaign.name)
     count = len(progress.finished)
     if count or status:
@@ -201,33 +195,29 @@ def _print_reasons(results: Path, log: Path, begin: int, progress: Progress, sto
 
     errors = {}
     for file in sorted(log.parent.rglob("*.log")):
-        if file != log and file.stat().st_mtime >= progress.called:
-            lines = file.read_text(encoding="utf-8", errors="replace").splitlines()
-            if found := [line for line in lines if line.startswith("Error:")]:
-                errors[file] = found[-1].removeprefix("Error:").strip()
+        if file != log and file.stat().st_mtime >= progress.start:
+            found = re.findall("^Error: *(.*)", file.read_text(encoding="utf-8", errors="replace"), re.MULTILINE)
+            errors |= {file: found[-1]} if found else {}
     if errors:
         lines = [f"{printable(error)}\n        log: {shorten_path(file)}" for file, error in errors.items()]
         _print_lines(f"{format_count(len(errors), 'job')} failed:", lines)
     elif not stopped:
-        heading = "continue" if progress.finished else "start"
         output = log.read_bytes()[begin:].decode(errors="replace").splitlines()
         # A job that was killed has written no error; Snakemake names the signal in the lines before the rule.
         failed = next((k for k, line in enumerate(output) if line.startswith("Error in rule")), None)
         shown = output[-MOST_LINES:] if failed is None else output[max(failed - 3, 0) : failed + 6]
-        _print_lines(f"Snakemake could not {heading}:", shown)
+        _print_lines(f"Snakemake could not {'continue' if progress.finished else 'start'}:", shown)
     if reason := probe_folder(results):
         # The logs of the jobs are in the same folder, so the jobs may have been unable to report the error.
-        echo(
-            f"cannot write to {shorten_path(results)}: {reason.strerror}. Solve this problem and repeat the command",
-            fg="red",
-        )
+        folder = shorten_path(results)
+        echo(f"cannot write to {folder}: {reason.strerror}. Solve this problem and repeat the command", fg="red")
     if stopped:
         echo("Stopped before the end. Repeat the command to continue.", fg="red")
     return [file.name for file in errors]
 
 
-def _print_lines(heading: str, lines: list[str]) -> None:
-    echo(heading, fg="red")
+def _print_lines(heading: str, lines: list[str], colour: str | None = "red") -> None:
+    echo(heading, fg=colour)
     for line in lines[:MOST_LINES]:
         echo(f"    {line}")
     if len(lines) > MOST_LINES:
@@ -235,7 +225,7 @@ def _print_lines(heading: str, lines: list[str]) -> None:
 
 
 def _print_early_ends(campaign, results: Path, items) -> None:
-    """Print the runs that failed, and those that physics ended early; write all reasons to files in `logs`."""
+    """Print the contacts whose runs failed or ended early by physics; write all reasons to files in `logs`."""
     from icha.planning.plan import DONE, FAILED, RUNS
     from icha.planning.results import campaign_files
 
@@ -252,64 +242,16 @@ def _print_early_ends(campaign, results: Path, items) -> None:
             continue
         file = results / "logs" / name
         file.write_text("".join(f"{case.path}: {reason}\n" for case, reason in reasons.items()), encoding="utf-8")
-        echo(f"{format_count(len(reasons), 'run')} {what}; all reasons: {shorten_path(file)}", fg=colour)
-        _print_contacts(reasons, cases.values())
-
-
-def _print_contacts(reasons, cases) -> None:
-    """Print one line for all seeds of a contact in `reasons`, with the first reason; `cases` are all runs."""
-    from icha.contact.models import DEFAULT_MODEL, MODELS
-
-    requested = Counter(case._replace(seed=0) for case in cases)
-    groups: dict = {}
-    for case in reasons:
-        groups.setdefault(case._replace(seed=0), []).append(case)
-    for contact, failed in itertools.islice(groups.items(), MOST_LINES):
-        seeds = f"{len(failed)} of {requested[contact]} seeds" if requested[contact] > 1 else "1 run"
-        model = "" if contact.model == DEFAULT_MODEL else f", {MODELS[contact.model].words}"
-        place = f"{contact.surface}, slope {contact.rms_slope:g}, {contact.material}{model}"
-        echo(f"  {contact.study}: {seeds} of {place}", bold=True)
-        echo(f"    {reasons[failed[0]]}")
-    if len(groups) > MOST_LINES:
-        echo(f"  … and {len(groups) - MOST_LINES} more groups in the file")
-
-
-def _reach_accuracy(campaign, path: Path, folder: Path, cores: int, compute):
-    """Increase the seeds of studies with `accuracy` until all intervals are narrow enough.
-
-    Returns
-    -------
-    The campaign with the last seeds, and the last choice of each study (`icha.planning.levels`).
-    """
-    from icha.configuration.load import load_configuration
-    from icha.planning.levels import choose_levels, words_of_levels, write_levels
-
-    results, choices = folder / "results" / campaign.name, {}
-    if all(study.accuracy is None for study in campaign.studies.values()):
-        return campaign, choices
-    from icha.planning.results import campaign_files
-
-    for extension in range(_MOST_EXTENSIONS + 1):
-        # The target `dataset` includes the verdict, which one failed run is enough to stop.
-        compute(campaign, ["runs", f"results/{campaign.name}/{campaign_files(campaign).dataset}"])
-        choices = choose_levels(campaign, results, cores)
-        extended = {name: choice for name, choice in choices.items() if choice.counts}
-        if not extended or extension == _MOST_EXTENSIONS:
-            break
-        for name, choice in extended.items():
-            time = formatting.duration(choice.seconds / cores)
-            echo(f"{name}: {choice.sentence}; next: {words_of_levels(choice.counts)}, {time} in all", bold=True)
-        write_levels(results, extended)
-        campaign = load_configuration(path, results=folder / "results").campaign
-    return campaign, choices
-
-
-def _print_accuracy(choices) -> None:
-    """Print the accuracy that each study has reached, and the reason if it is not the required one."""
-    for name, choice in choices.items():
-        reached = choice.half_width <= choice.required
-        reason = "" if reached else f". Not reached: {choice.reason or 'repeat the command to add seeds'}"
-        echo(f"answer:   study {name}: {choice.sentence}{reason}", fg=None if reached else "yellow")
+        # One line for all seeds of a contact, with the first reason.
+        contacts: dict = {}
+        for case in reasons:
+            contacts.setdefault(case._replace(seed=0), []).append(case)
+        lines = [
+            f"{first.path}: {reasons[first]} ({format_count(1 + len(rest), 'seed')})"
+            for first, *rest in contacts.values()
+        ]
+        heading = f"{format_count(len(reasons), 'run')} {what}; all reasons: {shorten_path(file)}"
+        _print_lines(heading, lines, colour)
 
 
 def _print_checks(campaign, results: Path) -> None:
@@ -317,27 +259,18 @@ def _print_checks(campaign, results: Path) -> None:
     import xarray as xr
 
     from icha.analysis.checks import read_checks
-    from icha.analysis.measured_error import measured_errors
-    from icha.analysis.validity import statements_on_dataset
-    from icha.contact.models import DEFAULT_MODEL
+    from icha.analysis.measured_error import statements_on_results
+    from icha.datasets.files import read_campaign
     from icha.planning.results import campaign_files
 
-    files = campaign_files(campaign)
-    checks = read_checks(results / files.checks)
+    files = campaign_files(campaign, str(results))
+    checks = read_checks(files.checks)
     passed = sum(check.passed for check in checks)
     echo(f"checks:  {passed} of {len(checks)} checks of the solved equations passed")
     echo("Applicability of the models, which is a separate question:")
-    with xr.open_datatree(results / files.dataset, engine="netcdf4") as tree:
-        statements = statements_on_dataset(tree)
-        of_asperities = {name for name, node in tree.children.items() if DEFAULT_MODEL in node["model"].values}
-    if files.model_error:
-        with xr.open_datatree(results / files.model_error[0], engine="netcdf4") as errors:
-            measured = measured_errors(errors)
-        # Where all studies have a measured error, the statement on other surfaces is not needed.
-        if of_asperities <= measured.keys():
-            statements = [each for each in statements if each.about != "accuracy"]
-        statements = [*measured.values(), *statements]
-    _print_statements(statements)
+    errors = read_campaign(files.model_error[0]) if files.model_error else None
+    with xr.open_datatree(files.dataset, engine="netcdf4") as tree:
+        _print_statements(statements_on_results(tree, errors))
 
 
 def _print_statements(statements) -> None:

@@ -14,9 +14,8 @@ from pathlib import Path
 
 import xarray as xr
 
-from icha.analysis.measured_error import measured_errors
+from icha.analysis.measured_error import statements_on_results
 from icha.analysis.sensitivity import left_out_of_samples
-from icha.analysis.validity import statements_on_dataset
 from icha.checks.findings import Check
 from icha.contact.models import MODEL_PAPER
 from icha.datasets.results import figure_number
@@ -78,15 +77,13 @@ def write_report(
 
     checks, surfaces = list(checks), list(surfaces)
     studies = {name: node.to_dataset() for name, node in campaign.children.items()}
-    statements = statements_on_dataset(campaign)
-    statements += [] if model_error is None else measured_errors(model_error).values()
     reasons, not_valid = failures(studies, link(Path(results, "runs")) if results is not None else None)
     values = {
         "title": campaign.attrs.get("title", "Rough contact campaign"),
         "summary": campaign.attrs.get("summary", ""),
         "attributes": campaign.attrs,
         "runs": sum(map(count_runs, studies.values()), Counter()),
-        "statements": statements,
+        "statements": statements_on_results(campaign, model_error),
         "answers": [] if answers is None else [_answers(name, node) for name, node in answers.children.items()],
         "samples": []
         if sensitivity is None

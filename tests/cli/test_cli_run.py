@@ -93,7 +93,7 @@ def test_a_job_that_crashes_is_named_with_its_log_and_stops_no_other(project):
 def test_an_end_that_physics_decides_is_a_result(project):
     output = run(project, "dataset")
     assert "1 run ended before the last target, as physics decides; all reasons: results/tiny/logs/ended" in output
-    assert "\n  load: 1 run of rough, slope 1, sticky\n    the path ends at" in output
+    assert "\n    load/rough/seed1/slope1/sticky: the path ends at" in output and " (1 seed)\n" in output
     reasons = (project / "results/tiny/logs/ended_runs.txt").read_text()
     assert reasons.startswith("load/rough/seed1/slope1/sticky: the path ends at") and reasons.count("\n") == 1
 
@@ -105,7 +105,7 @@ def test_a_run_that_fails_leaves_a_dataset_and_is_listed_with_its_reason(project
     (project / "config/campaigns/far.yaml").write_text(yaml.safe_dump(far))
     output = run(project, "dataset", campaign="far", status=1)
     assert "2 runs failed; all reasons: results/far/logs/failed_runs.txt" in output
-    assert "\n  load: 2 of 2 seeds of rough, slope 1, bare\n    nothing was computed: path: " in output
+    assert "\n    load/rough/seed1/slope1/bare: nothing was computed: path: " in output and " (2 seeds)\n" in output
     assert "1 job failed:" in output and "logs/verdict.log" in output
     assert "dataset: results/far/dataset/far.nc" in output
     assert re.search(r"^far: 8 files to compute, about .* on 2 cores", output, re.MULTILINE)
