@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
 from pydantic import ConfigDict, Field
 
-from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL, first_model
+from icha.contact.models import DEFAULT_MODEL, MODELS, REFERENCE_MODEL, first_model
 from icha.datasets import results
 from icha.datasets.labels import RunLabels
 from icha.path.snapshots import Snapshot
@@ -263,11 +263,14 @@ class ComparedFigure(StudyFigure):
         return super().inputs(campaign, files) | {"model_error": files.path(results.MODEL_ERROR)}
 
     def study_problems(self, campaign, study):
-        """Also yield a problem if the study has no boundary elements at the loads of its asperity runs."""
+        """Also yield a problem if the study has not both models, or no targets at which both have the same load."""
         yield from super().study_problems(campaign, study)
-        if not campaign.compares_models(self.study):
-            expected = "expected a study with both `models` and targets `reduced_pressures`"
-            yield ("study",), self.study, f"has no boundary elements at the same loads; {expected}"
+        expected = "expected a study with both `models` and targets `reduced_pressures`"
+        if len(study.models) < len(MODELS):
+            yield ("study",), self.study, f"has only runs with {list_names(study.models)}; {expected}"
+        elif not campaign.compares_models(self.study):
+            problem = "has no targets `reduced_pressures`, at which both models have the same load"
+            yield ("study",), self.study, f"{problem}; {expected}"
 
 
 class LoopsFigure(UnitsFigure, TruthFigure, TopographyFigure, UnloadedFigure):

@@ -6,6 +6,7 @@ the columns `COLUMNS`; columns without any value are left out.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -32,6 +33,7 @@ COLUMNS = {
     "high": ("upper end of the error bar or band", "y"),
     "seeds": ("number of seeds in the mean", "1"),
     "radius": ("radius of a contact spot at x and y", "x"),
+    "pressure": ("contact pressure at x and y", "Pa"),
     "x_quantity": ("label of the horizontal axis, with its unit", ""),
     "y_quantity": ("label of the vertical axis, with its unit", ""),
 }
@@ -68,6 +70,21 @@ def record(axes: Axes, x: Any, y: Any, name: Name | str, **columns: Any) -> None
     labels = {} if name.labels is None else {label: getattr(name.labels, label) for label in LABELS}
     figure = axes.get_figure()
     figure.__dict__.setdefault("recorded", []).append((axes, {"curve": name.curve, "x": x, "y": y} | labels | columns))
+
+
+def count_seeds(axes: Axes, words: str, handle: Artist, counts: Iterable[int]) -> None:
+    """Name the scatter of means over `counts` seeds in the legend of a figure."""
+    found = axes.get_figure().__dict__.setdefault("scatter_of_means", {})
+    found.setdefault(words, (handle, set()))[1].update(counts)
+
+
+def scatter_handles(figure: Figure) -> dict[str, Artist]:
+    """Return the legend entries of the scatter of means, with the numbers of seeds."""
+    found = {}
+    for words, (handle, counts) in getattr(figure, "scatter_of_means", {}).items():
+        span = "–".join(map(str, sorted({min(counts), max(counts)})))
+        found[f"{words}, n = {span}"] = handle
+    return found
 
 
 def table_of(figure: Figure) -> pd.DataFrame:

@@ -1,16 +1,19 @@
-"""Draw means over seeds. With many seeds, bands or bars show the scatter; with few seeds, every seed is drawn."""
+"""Draw means over seeds. With many seeds, bands or bars show the scatter; with few seeds, every seed is drawn.
+
+What draws a mean also explains it in the caption and names its scatter for the legend.
+"""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from icha.analysis.left_out import too_few
 from icha.datasets.labels import RunLabels
-from icha.figures.drawn import Name, record, say
+from icha.figures.drawn import Name, count_seeds, record, say
 from icha.figures.looks import FEWER_SEEDS
 from icha.figures.select import ContactRuns
 from icha.figures.style import GREY, legend_handle
@@ -19,8 +22,6 @@ from icha.support.statistics import ENOUGH, ensemble
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.container import ErrorbarContainer
-    from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
 
 # Largest number of curves whose single seeds are drawn; with more curves, only the means could be told apart.
 MOST_SCATTERED = 4
@@ -29,6 +30,23 @@ _MEAN_MARKERS = 24
 _SEED_LINE = {"ls": "-", "lw": 0.5, "alpha": 0.5, "zorder": 1.6}
 _SEED_DOT = {"ls": "none", "marker": ".", "ms": 5, "mew": 0, "alpha": 0.5, "zorder": 2.5}
 _CROSS = {"ls": "none", "marker": "x", "mew": 0.7, "label": FEWER_SEEDS}
+_MEANS = "Results are means over the seeds (realisations of the surface)."
+# Legend entry, its look and the sentence of each kind of scatter.
+_BAND = (
+    "mean and 95 % band",
+    {"alpha": 0.35, "lw": 6, "solid_capstyle": "butt"},
+    """A band shows the 95 % confidence
+interval of the mean (Student's t), on a logarithmic axis of the logarithm.""",
+)
+_SEEDS = "single seeds beside their mean", _SEED_LINE, "Pale thin lines show the single seeds."
+_UNSEEN = "means over the seeds", {"ls": "none"}, ""
+_BARS = (
+    "mean and 95 % interval",
+    {"marker": "|", "ls": "none", "ms": 8},
+    """Bars are 95 % confidence intervals of the
+mean (Student's t), for positive quantities of the logarithm.""",
+)
+_RANGE = "mean and range", _BARS[1], "Bars are the range of the single seeds."
 
 
 def draw_members(
@@ -40,7 +58,8 @@ def draw_members(
     positive: bool,
     name: Name,
     asked: int = 0,
-    curves: int = 1,
+    curves: int | None = 1,
+    ls: object = "-",
 ) -> np.ndarray:
     """Draw the mean over the members of an ensemble as a line, with a band or lines that show the scatter.
 
@@ -54,17 +73,19 @@ def draw_members(
     positive : True for a logarithmic axis; the confidence band is then positive, and zeros are left out.
     name : name of the curve in the table of the figure.
     asked : number of requested members; markers of means over fewer members are crossed out.
-    curves : number of curves in the panel; with many curves, few members are not drawn.
+    curves : number of curves in the panel; with many curves, few members are not drawn. None for a line beside a curve.
+    ls : style of the line.
     """
     mean, known = ensemble(members).mean, np.isfinite(members)
-    scattered = len(members) > 1 and (len(members) >= ENOUGH or curves <= MOST_SCATTERED)
-    ends = np.full((2, len(x)), np.nan)
+    scattered = len(members) > 1 and (len(members) >= ENOUGH or 0 < (curves or 0) <= MOST_SCATTERED)
+    ends = _ends(members, positive=positive, asked=asked)
     if scattered:
-        ends = _ends(members, positive=positive, asked=asked)
         _draw_scatter(axes, x, members, ends, look["color"], positive=positive)
+    elif len(members) > 1 and curves:
+        _explain(axes, _UNSEEN, [len(members)])
     record(axes, x, mean, name, low=ends[0], high=ends[1], seeds=known.sum(axis=0))
     every = max(1, -(-len(x) // _MEAN_MARKERS))
-    axes.plot(*_break_lines(known, x, mean), **{"lw": 0.9} | look | {"ls": "-", "markevery": every})
+    axes.plot(*_break_lines(known, x, mean), **{"lw": 0.9, "markevery": every} | look | {"ls": ls})
     mark_fewer(axes, x, mean, known, look, asked, every)
     return members if scattered else mean[None]
 
@@ -112,15 +133,24 @@ def _draw_scatter(axes, x, members, ends, colour, *, positive):
     """Draw a confidence band, or every member if members are few; the band does not change the limits of the axes."""
     over = ensemble(members)
     if over.count.min(initial=len(members)) < ENOUGH:
+        _explain(axes, _SEEDS, [len(members)])
         # A line with a single point would be invisible.
         look = _SEED_DOT if members.shape[1] == 1 else _SEED_LINE
         for member in members:
             axes.plot(x, np.where(member > 0, member, np.nan) if positive else member, color=colour, **look)
         return
+    _explain(axes, _BAND, [len(members)])
     limits = axes.dataLim.frozen()
     band = _break_lines(np.isfinite(members), x, *ends)
     axes.fill_between(*band, color=colour, alpha=0.18, lw=0, zorder=1.5)
     axes.dataLim.set(limits)
+
+
+def _explain(axes, kind, counts):
+    """Explain means over `counts` seeds and their scatter in the caption, and name them for the legend."""
+    words, look, sentence = kind
+    say(axes, _MEANS, sentence)
+    count_seeds(axes, words, legend_handle(color=GREY, **look), counts)
 
 
 def join_bins(edges: np.ndarray, contents: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray]:
@@ -178,6 +208,9 @@ def draw_points(
     """
     known, over = np.isfinite(members), ensemble(members)
     several, ends = over.count > 1, _ends(members, positive=positive, asked=asked)
+    for kind, alike in ((_BARS, over.count >= ENOUGH), (_RANGE, several & (over.count < ENOUGH))):
+        if alike.any():
+            _explain(axes, kind, over.count[alike].tolist())
     x = ensemble(np.where(known, x, np.nan)).mean
     record(axes, x, over.mean, name, low=ends[0], high=ends[1], seeds=over.count)
     x, bars = shift * x, np.array([over.mean - ends[0], ends[1] - over.mean])
@@ -232,53 +265,7 @@ class Points:
         """Means over the seeds, an array of shape (quantities, k)."""
         return ensemble(self.members, axis=1).mean
 
-    @property
-    def counts(self) -> list[int]:
-        """Number of seeds in the mean of each point."""
-        return np.isfinite(self.members[0]).sum(axis=0).tolist()
-
     def draw(self, axes: Axes, look: dict, quantity: int = 1, *, shift: float = 1.0) -> ErrorbarContainer:
         """Draw the variable with index `quantity` in `quantities` against the first variable, multiplied by `shift`."""
         x, y = self.members[0], self.members[quantity]
         return draw_points(axes, x, y, look, positive=True, name=self.name, asked=self.asked, shift=shift)
-
-
-def lines_handles(figure: Figure, counts: Iterable[int]) -> dict[str, Line2D]:
-    """Return the legend entries of lines that are means over `counts` seeds, and explain the lines in the caption."""
-    counts = list(counts)
-    if any(count > 1 for count in counts):
-        say(figure, _MEANS)
-    if len(counts) > MOST_SCATTERED and max(counts) < ENOUGH:
-        return _handles(figure, counts, {"": ({}, ""), "means over the seeds": ({"ls": "none"}, "")})
-    band = {"alpha": 0.35, "lw": 6, "solid_capstyle": "butt"}, _BAND
-    return _handles(
-        figure, counts, {"mean and 95 % band": band, "single seeds beside their mean": (_SEED_LINE, _SINGLE)}
-    )
-
-
-def points_handles(figure: Figure, counts: Iterable[int]) -> dict[str, Line2D]:
-    """Return the legend entries of points that are means over `counts` seeds, and explain the bars in the caption."""
-    counts, bars = list(counts), {"marker": "|", "ls": "none", "ms": 8}
-    if any(count > 1 for count in counts):
-        say(figure, "Points are means over the seeds (realisations of the surface).")
-    return _handles(figure, counts, {"mean and 95 % interval": (bars, _BARS), "mean and range": (bars, _RANGE)})
-
-
-_MEANS = """Lines and symbols are means over the seeds (realisations of the surface) at common loads, interpolated
-between the computed states of each seed."""
-_BAND = """A band shows the 95 % confidence interval of the mean (Student's t), on a logarithmic axis of the
-logarithm."""
-_SINGLE = "Pale thin lines show the single seeds; crosses are only means."
-_BARS = "Bars are 95 % confidence intervals of the mean (Student's t), for positive quantities of the logarithm."
-_RANGE = "Bars are the range of the single seeds."
-
-
-def _handles(figure, counts, looks):
-    """Return legend entries; the first look and sentence are for means over many seeds, the second for few seeds."""
-    sizes, found = {int(count) for count in counts if count > 1}, {}
-    for enough, (words, (look, sentence)) in zip((True, False), looks.items(), strict=True):
-        if group := {size for size in sizes if (size >= ENOUGH) == enough}:
-            say(figure, sentence)
-            span = "–".join(map(str, sorted({min(group), max(group)})))
-            found[f"{words}, n = {span}"] = legend_handle(color=GREY, **look)
-    return found

@@ -1,9 +1,8 @@
-"""Draw errors of the asperity model against load, for figures 10 and 11."""
+"""Figures of errors of the asperity model against load: area and separation (10), distributions and maps (11)."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,10 +11,10 @@ from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of
 from icha.figures.captions import range_of_attraction
 from icha.figures.drawn import Name, say
-from icha.figures.ensembles import draw_points, points_handles
+from icha.figures.ensembles import draw_points
 from icha.figures.looks import Contact, Looks, legend_below
 from icha.figures.select import NothingToDraw, compared_seeds, select_errors
-from icha.figures.style import in_style, logarithmic_axes, material_label, new_panels
+from icha.figures.style import in_style, logarithmic_axes, new_panels
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,10 +29,30 @@ _APART = 1.045
 _MARGIN, _LEAST_REACH = 1.2, 1.6
 
 
+_SAME = "on the same topographies at the same loads, against the reduced pressure F/(E* h'rms A0)."
+_AREA_AND_SEPARATION = f"""Relative differences between asperity model and boundary elements in contact area (left) and
+mean separation (right), {_SAME}"""
+_DISTRIBUTIONS = f"""Differences between asperity model and boundary elements, {_SAME} The left panels show the first
+Wasserstein distance W1 between the distributions of the contact pressure over the nominal area, in units of the nominal
+pressure. The middle panels show W1 of the gap, in units of the rms height. W1 is the area between two cumulative
+distributions. The right panels show the overlap of the contact maps: the area in contact in both models divided by the
+area in contact in at least one model."""
+
+
+def model_error(campaign: xr.DataTree, model_error: xr.DataTree, *, study: str) -> Figure:
+    """Draw the relative errors of contact area and mean separation."""
+    names = "area_error", "separation_error"
+    return _draw_errors(campaign, model_error, study, names, percent=True, words=_AREA_AND_SEPARATION)
+
+
+def distribution_error(campaign: xr.DataTree, model_error: xr.DataTree, *, study: str) -> Figure:
+    """Draw the distances of the distributions of pressure and gap, and the overlap of the contact maps."""
+    names = "pressure_distribution_distance", "gap_distribution_distance", "jaccard"
+    return _draw_errors(campaign, model_error, study, names, percent=False, words=_DISTRIBUTIONS)
+
+
 @in_style
-def draw_errors(
-    campaign: xr.DataTree, model_error: xr.DataTree, *, study: str, names: Sequence[str], percent: bool, words: str
-) -> Figure:
+def _draw_errors(campaign, model_error, study, names, *, percent, words):
     """Draw variables of the model error against load, with one panel for each variable.
 
     Parameters
@@ -42,19 +61,17 @@ def draw_errors(
     model_error : the errors of the campaign, from `icha.analysis.model_error.model_error`.
     study : name of the study; the figure shows all errors of this study.
     names : the variables, one for each column of panels.
-    words : first sentences of the caption.
     percent : True for relative errors, which are drawn in per cent; False for variables that are never negative.
+    words : first sentences of the caption.
     """
     curves = _curves(model_error, study, names)
     contacts = [contact for contact, _ in curves]
     own_rows = len({tuple(place) for _, *place in contacts}) > _MOST_LINES
-    interfaces = campaign[study].to_dataset()
-    looks = Looks(campaign, interfaces, contacts, by_place=own_rows)
+    looks = Looks(campaign, [study], contacts, by_place=own_rows)
     rows = [[material] for material in looks.materials] if own_rows else [looks.materials]
     fig, panels = new_panels(0.55 + 2.35 * len(rows), len(rows), len(names), sharex=True, sharey="col")
     say(fig, words)
     named: dict[str, object] = {}
-    counts: set[int] = set()
     for row, shown in zip(panels, rows, strict=True):
         drawn = [(*of, errors) for of, errors in curves.items() if of[0][0] in shown]
         if own_rows and not looks.adhesive(shown[0]):
@@ -68,11 +85,10 @@ def draw_errors(
             for ax, name in zip(row, names, strict=True):
                 members = (100 if percent else 1) * errors[name].values
                 handle = draw_points(ax, loads, members, look, positive=not percent, shift=shift, **of_curve)
-                counts.update(np.isfinite(members).sum(axis=0).tolist())
             if applicable:
                 named.setdefault(looks.place_name(contact[1:]) if own_rows else looks.name(contact), handle)
         for ax in row if own_rows else ():
-            ax.set_title(material_label(interfaces, shown[0]), loc="right", fontsize=8)
+            ax.set_title(looks.material_name(shown[0]), loc="right", fontsize=8)
     low, high = panels[0, 0].dataLim.intervalx
     middle, reach = np.sqrt(low * high), max(_MARGIN * np.sqrt(high / low), _LEAST_REACH)
     for ax, name in zip(panels.ravel(), itertools.cycle(names), strict=False):
@@ -83,7 +99,7 @@ def draw_errors(
         ax.set(xlabel=label_of("reduced_pressure"), ylim=(None if percent else 0, None))
     named.pop("", None)
     named = looks.colour_handles() if own_rows else looks.handles() if looks.many else named
-    legend_below(fig, named | points_handles(fig, counts), rows=looks.slopes_per_surface)
+    legend_below(fig, named, rows=looks.slopes_per_surface)
     errors = model_error[study]
     say(fig, range_of_attraction(errors["attraction"].values.ravel() if "attraction" in errors else ()))
     if not all(looks.adhesive(material) for material in looks.materials):

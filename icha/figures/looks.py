@@ -17,6 +17,7 @@ import numpy as np
 from icha.contact.models import DEFAULT_MODEL, MODELS, REFERENCE_MODEL
 from icha.datasets.labels import RunLabels, slopes_of
 from icha.datasets.quantities import symbol_of
+from icha.figures.drawn import scatter_handles
 from icha.figures.select import FINITE_RANGE_NAME
 from icha.figures.style import BLACK, COLOURS, GREY, INTERFACE, legend_handle, material_label, slope_label
 from icha.support.formatting import format_quantity
@@ -75,30 +76,37 @@ class Looks:
     Parameters
     ----------
     campaign : the campaign dataset; the order of the materials in the dataset determines the colours.
-    interfaces : modulus, surface energy and range of attraction of the materials.
+    studies : names of the studies with the materials.
     contacts : material, surface and rms slope of every line.
-    by_place : True if colours distinguish places instead of materials; always True for more than `MOST_COLOURS` places.
+    by_place : True if colours distinguish places instead of materials; None if they do so for a single material. Always
+        True for more than `MOST_COLOURS` places.
     crosses : True if boundary elements are drawn as crosses. Colours then distinguish places if there are more places
         than shapes of crosses.
+    only_drawn : True if names of materials need not differ from those of materials without a line.
     """
 
     def __init__(
         self,
         campaign: xr.DataTree,
-        interfaces: xr.Dataset,
+        studies: Sequence[str],
         contacts: Iterable[Contact],
         *,
-        by_place=False,
-        crosses=False,
+        by_place: bool | None = False,
+        crosses: bool = False,
+        only_drawn: bool = False,
     ):
         """Assign colours and markers to the lines."""
+        import xarray as xr
+
         self._campaign = campaign
         self.contacts = list(dict.fromkeys(contacts))
-        self.interfaces = interfaces
+        interfaces = xr.concat([campaign[study].to_dataset()[INTERFACE] for study in studies], "material")
         self.materials = list(dict.fromkeys(material for material, *_ in self.contacts))
+        interfaces = interfaces.drop_duplicates("material")
+        self._interfaces = interfaces.sel(material=self.materials) if only_drawn else interfaces
         self.places = list(dict.fromkeys(tuple(place) for _, *place in self.contacts))
         self.by_place = len(self.places) > (len(CROSSES) if crosses else MOST_COLOURS)
-        self.by_place |= by_place and len(self.places) > 1
+        self.by_place |= (len(self.materials) == 1 if by_place is None else by_place) and len(self.places) > 1
         coloured = self.places if self.by_place else self.materials
         self.many = len(coloured) > MOST_COLOURS
         graded = self.many or self.by_place
@@ -120,7 +128,7 @@ class Looks:
 
     def adhesive(self, material: str) -> bool:
         """Return True if the surface energy of a material is positive."""
-        return float(self.interfaces["surface_energy"].sel(material=material)) > 0
+        return float(self._interfaces["surface_energy"].sel(material=material)) > 0
 
     def colour(self, contact: Contact) -> str:
         """Return the colour of a contact; grey if the figure has no line of this material or surface."""
@@ -148,6 +156,22 @@ class Looks:
         if len(self.contacts) > FEW_LINES:
             look |= {"lw": 0.6, "ms": (0.6 if self.many else 0.8) * size}
         return look if applicable else pale(look, model)
+
+    def cross(
+        self, contact: Contact, model_name: str = REFERENCE_NAME, *, applicable: bool = True, shape: str | None = None
+    ) -> dict:
+        """Return arguments of `Axes.plot` for boundary elements: crosses in the colour of the material or place.
+
+        `shape` is the marker of the first surface and slope, if it is not the usual one.
+        """
+        colour, adhesive = self.colour(contact), self.adhesive(contact[0])
+        # Crosses without adhesion are larger than crosses with adhesion, so that both are visible if they coincide.
+        size = (8 if adhesive else 11) * (1 if len(self.contacts) <= FEW_LINES else 0.7)
+        rank = self.rank(contact) if model_name == REFERENCE_NAME else 0
+        marker = CROSSES[rank % len(CROSSES)] if rank else shape or MODEL_MARKERS[model_name]
+        look = {"color": colour, "mec": colour, "ms": size, "zorder": 6 + adhesive, "ls": "none", "marker": marker}
+        look |= {"mew": 1.0}
+        return look if applicable else pale(look, REFERENCE_MODEL)
 
     def handles(self, **changed: object) -> dict[str, Line2D]:
         """Return the legend entries of materials, surfaces and slopes by name.
@@ -198,7 +222,7 @@ class Looks:
 
     def material_name(self, material: str) -> str:
         """Return a text with the modulus and the surface energy of a material."""
-        return material_label(self.interfaces, material)
+        return material_label(self._interfaces, material)
 
     def place_name(self, place: tuple[str, float | None]) -> str:
         """Return surface and rms slope as text; a surface or slope that all lines have in common is left out."""
@@ -253,18 +277,6 @@ def _symbol_and_value(name, values, k):
     else:
         shown = format_quantity(value, "m") if values.attrs["units"] == "m" else f"{value:g}"
     return f"{symbol_of(name)} = {shown}"
-
-
-def looks_of_studies(
-    campaign: xr.DataTree, studies: Sequence[str], contacts: Iterable[Contact], *, crosses: bool = False
-) -> Looks:
-    """Return the `Looks` for lines of some studies; with a single material, colours distinguish surfaces and slopes."""
-    import xarray as xr
-
-    contacts = list(contacts)
-    interfaces = xr.concat([campaign[study].to_dataset()[INTERFACE] for study in studies], "material")
-    by_place = len({material for material, *_ in contacts}) == 1
-    return Looks(campaign, interfaces.drop_duplicates("material"), contacts, by_place=by_place, crosses=crosses)
 
 
 def material_colours(campaign: xr.DataTree) -> dict[str, str]:
@@ -327,15 +339,15 @@ _MOST_COLUMNS = 4
 def legend_below(
     figure: Figure, handles: Mapping[str, object], heading: str | None = None, *, rows: int | None = None
 ) -> None:
-    """Add a legend below the panels, with an entry for each handle, in as many columns as fit, and with a heading.
+    """Add a legend below the panels, in as many columns as fit, and with a heading.
 
-    If `rows` is given, columns have this number of rows if they fit. The legend increases the height of the figure, and
-    must therefore be added last.
+    The legend has an entry for each handle, for the scatter of means (`icha.figures.ensembles`), and for everything
+    that has a label in a panel. If `rows` is given, columns have this number of rows if they fit. The legend increases
+    the height of the figure, and must therefore be added last.
     """
-    marks = named_handles(figure.axes)
-    handles = dict(handles) | {
-        name: marks[name] for name in (FEWER_SEEDS, NOT_APPLICABLE, COARSE_GRID) if name in marks
-    }
+    named = named_handles(figure.axes)
+    last = {name: named.pop(name) for name in (FEWER_SEEDS, NOT_APPLICABLE, COARSE_GRID) if name in named}
+    handles = dict(handles) | scatter_handles(figure) | named | last
     look = {"loc": "outside lower center", "fontsize": 8 if len(handles) <= _MANY_NAMES else 7}
     most, names, entries = _MOST_COLUMNS if handles else 0, list(handles), list(handles.values())
     if rows and (needed := -(-len(names) // rows)) <= _MOST_COLUMNS:

@@ -98,9 +98,23 @@ def wrap_circles(x, y, radius, period: float, boundary: str) -> np.ndarray:
     return circles[np.all((circles[..., :2] > -reach) & (circles[..., :2] < period + reach), axis=-1)]
 
 
+def spot_circles(run: xr.Dataset, snapshot: int, length: float) -> np.ndarray:
+    """Return the spots of a snapshot as circles (`wrap_circles`); `length` converts metres to the unit of the axes."""
+    from icha.datasets.campaign import spots_of
+
+    spots = spots_of(run, snapshot)
+    x, y, radius = (spots[f"spot_{name}"].values * length for name in ("x", "y", "radius"))
+    return wrap_circles(x, y, radius, float(run["period"]) * length, str(run["boundary"].values))
+
+
+def without_images(circles: np.ndarray, side: float) -> np.ndarray:
+    """Return the circles on a square without their periodic images."""
+    return circles[((circles[:, :2] >= 0) & (circles[:, :2] < side)).all(axis=1)]
+
+
 def record_spots(axes: Axes, circles: np.ndarray, side: float, name: Name) -> None:
     """Record contact spots on a square; periodic images of spots are left out."""
-    x, y, radius = circles[((circles[:, :2] >= 0) & (circles[:, :2] < side)).all(axis=1)].T
+    x, y, radius = without_images(circles, side).T
     record(axes, x, y, name, radius=radius)
 
 

@@ -36,7 +36,7 @@ def _importing_from(folder: Path) -> Iterator[None]:
 
 
 @in_style
-def figure(campaign: xr.DataTree, script: str, *, study: str) -> Figure:
+def own(campaign: xr.DataTree, script: str, *, study: str) -> Figure:
     """Draw a study with the function `draw` of a script, in the style of all figures."""
     from matplotlib.figure import Figure
 

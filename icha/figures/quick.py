@@ -6,6 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from icha.datasets.quantities import quantity
+from icha.figures.curves import Panel
+from icha.figures.maps import draw_spots
 from icha.support.formatting import choose_unit
 
 if TYPE_CHECKING:
@@ -22,12 +25,12 @@ def plot_area(run: xr.Dataset, axes: Axes | None = None, **look: object) -> Axes
     axes : axes to draw on; None for new axes.
     look : keyword arguments of `Axes.plot`.
     """
-    return _plot_against_pressure(run, "contact_area_fraction", "contact area  $A/A_0$", axes, look)
+    return _plot_against_pressure(run, "contact_area_fraction", axes, look)
 
 
 def plot_separation(run: xr.Dataset, axes: Axes | None = None, **look: object) -> Axes:
     """Plot the mean gap of a run against the nominal pressure; arguments as in `plot_area`."""
-    return _plot_against_pressure(run, "mean_gap", "mean gap", axes, look)
+    return _plot_against_pressure(run, "mean_gap", axes, look)
 
 
 def plot_contact(run: xr.Dataset, axes: Axes | None = None, *, snapshot: int = -1) -> Axes:
@@ -48,30 +51,28 @@ def plot_contact(run: xr.Dataset, axes: Axes | None = None, *, snapshot: int = -
         ends = np.array([-0.5, len(contact) - 0.5]) * side * factor / len(contact)
         axes.imshow(contact, origin="lower", extent=(*ends, *ends), cmap="Greys", vmin=0, vmax=1)
     else:
-        from matplotlib.collections import EllipseCollection
-
         number = run["snapshot"].values[snapshot]
         spots = run.isel(spot=np.flatnonzero(run["spot_snapshot"].values == number))
-        x, y, radius = (spots[f"spot_{name}"].values * factor for name in ("x", "y", "radius"))
-        places = np.column_stack([x, y])
-        circles = EllipseCollection(2 * radius, 2 * radius, 0, units="xy", offsets=places, transOffset=axes.transData)
-        axes.add_collection(circles)
+        draw_spots(axes, np.column_stack([spots[f"spot_{name}"].values * factor for name in ("x", "y", "radius")]))
         axes.set(xlim=(0, side * factor), ylim=(0, side * factor), aspect="equal")
     axes.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})")
     return axes
 
 
-def _plot_against_pressure(run, name, label, axes, look):
+def _plot_against_pressure(run, name, axes, look):
     axes = _new_axes() if axes is None else axes
-    pressure, values = run["nominal_pressure"].values, run[name].values
-    per_pressure, pressure_unit = choose_unit(float(np.abs(pressure).max(initial=0.0)) or 1.0, "Pa")
-    unit, factor = run[name].attrs.get("units", "1"), 1.0
-    if unit != "1":
-        factor, unit = choose_unit(float(np.abs(values).max(initial=0.0)) or 1.0, unit)
-        label = f"{label}  ({unit})"
-    axes.plot(pressure * per_pressure, values * factor, **{"marker": "o", "ms": 3} | look)
-    axes.set(xlabel=f"pressure  ({pressure_unit})", ylabel=label)
+    names = "nominal_pressure", name
+    factors, units = zip(*(_unit(run, each) for each in names), strict=True)
+    panel = Panel(*names, factors, units)
+    axes.plot(*panel.points(run), **{"marker": "o", "ms": 3} | look)
+    panel.label(axes)
     return axes
+
+
+def _unit(run, name):
+    """Return factor and unit of an axis; areas are fractions."""
+    unit, most = quantity(name).unit, float(np.abs(run[name].values).max(initial=0.0))
+    return (1.0, "") if unit == "1" else choose_unit(most or 1.0, unit)
 
 
 def _new_axes():

@@ -1,7 +1,7 @@
-"""Draw figures by their names: each figure is a module `fig<number>_<words>` with a function `figure`.
+"""Draw figures by their names: the figure `fig<number>_<words>` is drawn by the function `<words>` of a module.
 
-The module `own_figure` draws all figures of the user's own, whose names do not begin in this way. The function `figure`
-receives the data and the arguments that the request of the figure names (`icha.configuration.figures`). It raises
+The module `own_figure` draws all figures of the user's own, whose names do not begin in this way. A function receives
+the data and the arguments that the request of the figure names (`icha.configuration.figures`). It raises
 `icha.figures.select.NothingToDraw` if no run in the figure is complete.
 """
 
@@ -10,8 +10,7 @@ from __future__ import annotations
 import importlib
 import os
 import textwrap
-from collections.abc import Mapping, Sequence
-from types import ModuleType
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from icha.datasets.results import figure_number
@@ -26,14 +25,32 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+# The module of each function that draws a figure.
+_MODULES = {
+    "jkr": "one_asperity",
+    **dict.fromkeys(("area_and_gap", "multi_slope", "stiffness"), "against_load"),
+    **dict.fromkeys(("distributions", "patch_sizes"), "at_one_load"),
+    **dict.fromkeys(("contact_map", "spots_by_slope", "snap_map", "pressure_maps"), "contact_maps"),
+    **dict.fromkeys(("tabor", "pull_off", "loss", "work_of_adhesion"), "against_parameter"),
+    **dict.fromkeys(("model_error", "distribution_error"), "errors"),
+    **dict.fromkeys(("loops", "force_indentation", "jkr_plot"), "loops"),
+    **dict.fromkeys(("sensitivity", "parameters"), "samples"),
+    "own": "own_figure",
+}
+
+
 def module_name(name: str) -> str:
     """Return the name of the module that draws a figure."""
-    return f"icha.figures.{name if figure_number(name) else 'own_figure'}"
+    return f"icha.figures.{_MODULES[_function(name)]}"
 
 
-def figure_module(name: str) -> ModuleType:
-    """Import the module of a figure and return it."""
-    return importlib.import_module(module_name(name))
+def drawing_function(name: str) -> Callable[..., Figure]:
+    """Return the function that draws a figure."""
+    return getattr(importlib.import_module(module_name(name)), _function(name))
+
+
+def _function(name):
+    return name.partition("_")[2] if figure_number(name) else "own"
 
 
 def draw_figure(
@@ -61,7 +78,7 @@ def draw_figure(
 
     data = {argument: _read(files) for argument, files in inputs.items()}
     try:
-        figure = figure_module(name).figure(**data, **arguments)
+        figure = drawing_function(name)(**data, **arguments)
         groups = getattr(data.get("campaign"), "children", {})
         say(figure, units_of_shapes(figure, [groups[study].to_dataset() for study in studies if study in groups]))
         caption = caption_in(data["script"]) if "script" in data else caption_of(figure)

@@ -1,21 +1,121 @@
-"""Data of the figures of studies with `sample`: results at one target, and the names of parameters and quantities."""
+"""Figures of sampled cases: share of the variance that each parameter causes (21), and a result against each (22)."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from icha.contact.models import MODELS
-from icha.datasets.quantities import quantity, state_words, symbol_of
+from icha.datasets import quantities
+from icha.datasets.quantities import state_words, symbol_of
+from icha.figures.drawn import plot, record, say
+from icha.figures.looks import legend_below
+from icha.figures.select import NothingToDraw
+from icha.figures.style import BLUE, GREY, TWO_COLUMNS, VERMILLION, in_style, legend_handle, logarithmic_axes, new_grid
 from icha.support.formatting import choose_unit
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import xarray as xr
+    from matplotlib.figure import Figure
+
+# Thickness of a bar.
+_BAR = 0.36
+_CAP = {"ecolor": GREY, "elinewidth": 0.8, "capsize": 1.5, "ls": "none"}
+# Both bars of a parameter: name, variable, shift and look.
+_SHARES = (
+    ("the parameter alone (first order)", "first_order", -_BAR / 2, {"color": BLUE}),
+    ("with all other parameters (total)", "total_order", _BAR / 2, {"color": "white", "ec": BLUE}),
+)
+# The axis of the result is logarithmic if the largest value is so many times the smallest.
+_DECADE = 5.0
+_CASE = {"ls": "none", "marker": "o", "ms": 3.2, "mfc": "none", "mec": BLUE, "mew": 0.7}
+_MEAN = "mean over the other parameters"
 
 
-def responses(data: xr.Dataset, target: int) -> xr.Dataset:
+@in_style
+def sensitivity(sensitivity: xr.DataTree, *, study: str, target: int = -1) -> Figure:
+    """Draw one panel for each result, with two bars for each parameter."""
+    data = sensitivity[study].to_dataset()
+    shown = _responses(data, target)
+    shown = shown.isel(response=(shown["degree"] > 0).values)
+    if not shown.sizes["response"]:
+        raise NothingToDraw(f"study {study}: too few cases have results; expected at least twice the parameters")
+    names = data["parameter"].values.tolist()
+    size = 0.75 + 0.34 * len(names), TWO_COLUMNS / 2
+    fig, panels, columns = new_grid(shown.sizes["response"], 2, *size, room=(0.0, 0.4), sharex=True, sharey=True)
+    say(
+        fig,
+        """Share of the variance of the logarithm of each result that each sampled parameter causes. Filled bars: the
+        parameter alone (first-order index). Open bars: the parameter alone and together with other parameters (total
+        index). The shares are those of a polynomial that is fitted to the cases; error bars are intervals of 90 %
+        (jackknife over the cases).""",
+    )
+    places, handles = np.arange(len(names)), {}
+    for k, ax in enumerate(panels):
+        row = shown.isel(response=k)
+        for words, key, shift, look in _SHARES:
+            values, widths = 100 * row[key].values, 100 * row[f"{key}_half_width"].values
+            handles[words] = ax.barh(places + shift, values, _BAR, lw=0.8, **look)
+            ends = np.clip([values - widths, values + widths], 0, 100)
+            record(ax, values, names, f"{_title(data, row)}, {words}", low=ends[0], high=ends[1])
+            ax.errorbar(values, places + shift, xerr=abs(ends - values), **_CAP)
+        ax.set_title(_title(data, row), loc="right", fontsize=8)
+        ax.set(xlim=(0, 105), yticks=places, yticklabels=[symbol_of(name) for name in names])
+        ax.tick_params(axis="y", length=0)
+    for ax in panels[-columns:]:
+        ax.set_xlabel("share of variance (%)")
+    panels[0].invert_yaxis()
+    legend_below(fig, handles)
+    return fig
+
+
+@in_style
+def parameters(
+    sensitivity: xr.DataTree, *, study: str, target: int = -1, quantity: str = "contact_area_fraction"
+) -> Figure:
+    """Draw one panel for each parameter: a point for each case, and the mean over the other parameters as a line."""
+    data, described = sensitivity[study].to_dataset(), quantities.quantity(quantity)
+    shown = _responses(data, target)
+    shown = shown.isel(response=(shown["response_quantity"] == quantity).values)
+    if not shown.sizes["response"]:
+        raise NothingToDraw(f"study {study}: no case has a result for {described.name}")
+    row = shown.isel(response=0)
+    number, fitted = int(row["response_target"]), int(row["degree"]) > 0
+    values = data[quantity].sel(model=_best_model(data["model"].values.tolist()))
+    values = np.exp(np.log((values if number < 0 else values.isel(target=number)).where(lambda v: v > 0)).mean("seed"))
+    factor, unit = described.in_unit(float(row["middle"]))
+    results = values.values * factor
+    names = data["parameter"].values.tolist()
+    size = {"row_height": 2.0, "column_width": TWO_COLUMNS / 3, "room": (0.0, 0.3), "least": 1.5}
+    fig, panels, columns = new_grid(len(names), 3, **size, sharey=True)
+    say(fig, "A result of every sampled case against each sampled parameter.")
+    handles = {f"one case: {_title(data, row)}": legend_handle(**_CASE)}
+    if fitted:
+        handles[_MEAN] = legend_handle(color=VERMILLION)
+        say(
+            fig,
+            """Lines: mean over the other parameters, from the polynomial of figure 21, between the 5 % and the 95 %
+            quantile of the parameter.""",
+        )
+    for k, (ax, name) in enumerate(zip(panels, names, strict=True)):
+        scale, label = _scale(data, name)
+        plot(ax, data[name].values * scale, results, "case", **_CASE)
+        if fitted:
+            mean = row["main_effect"].values[k] * factor
+            plot(ax, data["effect_value"].values[k] * scale, mean, _MEAN, color=VERMILLION)
+        ax.set_xlabel(label)
+    for ax in panels[::columns]:
+        ax.set_ylabel(described.label(unit))
+    if np.nanmax(results) > _DECADE * np.nanmin(results):
+        logarithmic_axes(panels[0], "y")
+    legend_below(fig, handles)
+    return fig
+
+
+def _responses(data: xr.Dataset, target: int) -> xr.Dataset:
     """Return the results at one target and of the whole loop, for the model that is closest to the truth.
 
     Raises
@@ -23,34 +123,32 @@ def responses(data: xr.Dataset, target: int) -> xr.Dataset:
     NothingToDraw
         If no case has a result there.
     """
-    from icha.figures.select import NothingToDraw
-
     number = data.sizes["target"] - 1 if target < 0 else target
     if "response" not in data.dims:
         raise NothingToDraw(f"study {data.attrs['study']}: no case has a result")
     models = data["response_model"].values.tolist()
-    shown = data["response_target"].isin((number, -1)) & (data["response_model"] == best_model(models))
+    shown = data["response_target"].isin((number, -1)) & (data["response_model"] == _best_model(models))
     if not shown.any():
         raise NothingToDraw(f"study {data.attrs['study']}: no case has a result at target {number}")
     return data.isel(response=shown.values)
 
 
-def best_model(models: Sequence[str]) -> str:
+def _best_model(models: Sequence[str]) -> str:
     """Return boundary elements if a study has them, otherwise the asperity model."""
     return next(name for name in reversed(MODELS) if name in models)
 
 
-def title_of(data: xr.Dataset, row: xr.Dataset) -> str:
+def _title(data: xr.Dataset, row: xr.Dataset) -> str:
     """Return quantity and state of a result, such as `contact area at p* = 0.01`."""
     number = int(row["response_target"])
-    words = quantity(str(row["response_quantity"].item())).name
+    words = quantities.quantity(str(row["response_quantity"].item())).name
     if number < 0:
         return words
     kind, target = str(data["stop_kind"].values[number]), float(data["stop_target"].values[number])
     return f"{words} at {state_words(kind, target)}"
 
 
-def scale_of(data: xr.Dataset, name: str) -> tuple[float, str]:
+def _scale(data: xr.Dataset, name: str) -> tuple[float, str]:
     """Return factor and label of the axis of a parameter."""
     unit = data[name].attrs["units"]
     if unit == "1":

@@ -176,6 +176,11 @@ def shown_model(study: xr.Dataset) -> str:
     return first_model(study["model"].values.tolist())
 
 
+def shown_name(study: xr.Dataset) -> str:
+    """Return the name of the `shown_model` of a study in legends."""
+    return MODELS[shown_model(study)].words
+
+
 def select_by_labels(
     runs: Iterable[tuple[RunLabels, xr.Dataset]], **wanted: object
 ) -> list[tuple[RunLabels, xr.Dataset]]:
@@ -330,12 +335,17 @@ def select_unloaded_runs(
     NothingToDraw
         If no run is complete, or if no run unloads.
     """
-    from icha.datasets.campaign import unit_height
-
     runs = _select_runs_with(unloading_legs, campaign, study, [model, None, REFERENCE_MODEL])
     if not runs:
         raise NothingToDraw(f"study {study}: no run reached its unloading; `icha run` prints where the runs ended")
-    return [(labels, run.assign(reduced_separation=run["mean_separation"] / unit_height(run))) for labels, run in runs]
+    return [(labels, over_mean_separation(run)) for labels, run in runs]
+
+
+def over_mean_separation(run: xr.Dataset) -> xr.Dataset:
+    """Return a run whose reduced separation is the mean separation divided by the rms height, also on a free square."""
+    from icha.datasets.campaign import unit_height
+
+    return run.assign(reduced_separation=run["mean_separation"] / unit_height(run))
 
 
 def _select_runs_with(condition, campaign, study, models=(None, REFERENCE_MODEL)):
@@ -405,8 +415,3 @@ def pull_off_step(run: xr.Dataset) -> int | None:
     step = np.flatnonzero(run["step"].values == last["step"].values[lowest])[0]
     pressure = run["nominal_pressure"].values
     return int(step) if pressure[step] < -ROUNDING * pressure.max() else None
-
-
-def names_of_models(points: Iterable[ContactRuns]) -> list[str]:
-    """Return the names of the models of some runs in legends and titles."""
-    return [MODELS[model].words for model in dict.fromkeys(point.labels.model for point in points)]

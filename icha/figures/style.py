@@ -102,6 +102,33 @@ def new_panels(
     return figure, panels
 
 
+def new_grid(
+    count: int,
+    most: int,
+    row_height: float,
+    column_width: float,
+    *,
+    room: tuple[float, float] = (0.0, 0.0),
+    least: float = 1.0,
+    **options: object,
+) -> tuple[Figure, np.ndarray, int]:
+    """Return a figure with `count` panels in rows of at most `most`, its panels, and the number of columns.
+
+    `room` is added to the width and the height of the panels, inches; `least` is the least width in columns. The panels
+    `[-columns:]` have no panel below, the panels `[::columns]` none on the left.
+    """
+    columns = min(count, most)
+    rows = -(-count // columns)
+    size = {"height": rows * row_height + room[1], "width": max(columns, least) * column_width + room[0]}
+    figure, grid = new_panels(rows=rows, columns=columns, **size, **options)
+    panels = grid.ravel()[:count]
+    for axes in grid.ravel()[count:]:
+        axes.remove()
+    for axes in panels[-columns:]:
+        axes.tick_params(labelbottom=True)
+    return figure, panels, columns
+
+
 def save(figure: Figure, png: str | os.PathLike, pdf: str | os.PathLike) -> None:
     """Write a figure as PNG and as PDF, without the date and the name of the software."""
     with _style():

@@ -22,7 +22,7 @@ from icha.datasets.campaign import find_snapshot, reduced_gap, run_labels, selec
 from icha.datasets.files import read_campaign, read_dataset, readable
 from icha.datasets.labels import RunLabels, number_label, path_fields
 from icha.datasets.quantities import quantity
-from icha.figures.fig3_distributions import gap_densities, pressure_densities
+from icha.figures.at_one_load import gap_densities, pressure_densities
 from icha.figures.maps import average_blocks
 from icha.report.template import write_page
 from icha.support.formatting import printable

@@ -22,7 +22,8 @@ from icha.analysis.grid_error import (
 from icha.analysis.validity import statements_on_dataset
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import RunLabels
-from icha.figures import fig13_loops, fig14_pull_off, fig15_loss
+from icha.figures import against_parameter
+from icha.figures import loops as loop_figures
 from icha.figures.drawn import caption_of
 from icha.figures.looks import COARSE_GRID
 from icha.report.answers import answers_of, answers_table
@@ -80,11 +81,11 @@ def test_loops_on_a_coarse_grid_are_named_and_pale():
     assert (
         not stated["loops"].good and "0.7 cells for soft on rough (pull-off " in text and " % too small, loss " in text
     )
-    for module in (fig13_loops, fig14_pull_off, fig15_loss):
-        options = {"studies": ["pull"]} if module is fig15_loss else {"study": "pull"}
-        figure = module.figure(coarse, **options)
+    for module in (loop_figures.loops, against_parameter.pull_off, against_parameter.loss):
+        options = {"studies": ["pull"]} if module is against_parameter.loss else {"study": "pull"}
+        figure = module(coarse, **options)
         assert COARSE_GRID in legend(figure) and "0.7 cells for soft on rough" in caption_of(figure)
-        assert COARSE_GRID not in legend(module.figure(fine, **options))
+        assert COARSE_GRID not in legend(module(fine, **options))
     assert {each.about: each.good for each in statements_on_dataset(fine)}["loops"]
 
 

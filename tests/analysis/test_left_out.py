@@ -24,7 +24,7 @@ from icha.datasets.campaign import select_run
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import RunLabels
 from icha.datasets.table import tidy_table
-from icha.figures import fig14_pull_off, fig15_loss, fig21_sensitivity, fig22_parameters
+from icha.figures import against_parameter, samples
 from icha.figures.captions import count_runs
 from icha.figures.looks import FEWER_SEEDS
 from icha.report.answers import answers_of, samples_table
@@ -89,8 +89,8 @@ def test_sampled_cases_state_what_they_leave_out(without_the_stickiest):
     assert line.startswith(f"all results: {used} of {COUNT} cases; 16 failed a check, all with surface energy above ")
     caption = count_runs({"sensitivity": without_the_stickiest}, ["one"])
     assert caption.startswith(f"all results: {used} of {COUNT} cases") and "no interval is stated" in caption
-    for module in (fig21_sensitivity, fig22_parameters):
-        assert module.figure(without_the_stickiest, study="one").axes
+    for module in (samples.sensitivity, samples.parameters):
+        assert module(without_the_stickiest, study="one").axes
 
 
 # --- failed checks of the loss ----------------------------------------------------------------------------------
@@ -137,10 +137,10 @@ def test_a_failed_check_of_the_loss_leaves_pull_off_and_areas():
     assert table["pull_off_pressure"].notna().all()
     assert left_out_of_study(tree["pull"].to_dataset()).words == ""
     for module, chosen, crossed in (
-        (fig14_pull_off, {"study": "pull"}, False),
-        (fig15_loss, {"studies": ["pull"]}, True),
+        (against_parameter.pull_off, {"study": "pull"}, False),
+        (against_parameter.loss, {"studies": ["pull"]}, True),
     ):
-        labels = [line.get_label() for line in module.figure(tree, **chosen).axes[0].get_lines()]
+        labels = [line.get_label() for line in module(tree, **chosen).axes[0].get_lines()]
         assert (FEWER_SEEDS in labels) == crossed
 
 

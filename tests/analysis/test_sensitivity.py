@@ -11,7 +11,7 @@ from icha.analysis.estimates import estimate_campaign
 from icha.analysis.sensitivity import sensitivity_of_campaign
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import inputs_study
-from icha.figures import fig21_sensitivity, fig22_parameters
+from icha.figures import samples
 from icha.report.answers import distribution_words, samples_table
 
 
@@ -71,10 +71,10 @@ def test_words_and_figures_state_the_indices(tree):
     assert table.head[4:6] == ("Hurst exponent", "surface energy") and tuple(table.rows[-1][4:6]) == ("", "")
     (area,) = (row for row in table.rows if row[0] == "contact area at p* = 0.01")
     assert area[4].startswith("44 ± ") and area[6].endswith(" %") and area[3] in table.as_text()
-    panels = fig21_sensitivity.figure(tree, study="one").axes
+    panels = samples.sensitivity(tree, study="one").axes
     shown = [bar.get_width() for bar in panels[0].patches]
     np.testing.assert_allclose(shown[:2], [43.65, 56.35], atol=0.1)
-    panels = fig22_parameters.figure(tree, study="one").axes
+    panels = samples.parameters(tree, study="one").axes
     assert [ax.get_xlabel() for ax in panels] == ["$H$", r"$\Delta\gamma$ (mJ/m²)"]
     points, line = (each.get_xydata() for each in panels[0].get_lines())
     assert len(points) == COUNT

@@ -26,16 +26,7 @@ from icha.datasets.labels import (
     slopes_of,
     surfaces_and_slopes,
 )
-from icha.figures import (
-    fig2_area_and_gap,
-    fig3_distributions,
-    fig5_multi_slope,
-    fig6_spots_by_slope,
-    fig7_stiffness,
-    fig8_patch_sizes,
-    fig10_model_error,
-    fig11_distribution_error,
-)
+from icha.figures import against_load, at_one_load, contact_maps, errors
 from icha.report.tables import failures, materials_table, studies_table
 
 
@@ -116,14 +107,14 @@ def test_xarray_alone_selects_a_surface_and_its_slope(tmp_path):
 def test_figures_of_either_form_show_the_same():
     study, tree, other = crops.STUDY, crops.tree(), crops.square_tree()
     figures = {
-        "fig2": lambda tree, errors: fig2_area_and_gap.figure(tree, study=study),
-        "fig3": lambda tree, errors: fig3_distributions.figure(tree, study=study),
-        "fig5": lambda tree, errors: fig5_multi_slope.figure(tree, study=study),
-        "fig6": lambda tree, errors: fig6_spots_by_slope.figure(tree, study=study),
-        "fig7": lambda tree, errors: fig7_stiffness.figure(tree, study=study),
-        "fig8": lambda tree, errors: fig8_patch_sizes.figure(tree, study=study),
-        "fig10": lambda tree, errors: fig10_model_error.figure(tree, errors, study=study),
-        "fig11": lambda tree, errors: fig11_distribution_error.figure(tree, errors, study=study),
+        "fig2": lambda tree, error: against_load.area_and_gap(tree, study=study),
+        "fig3": lambda tree, error: at_one_load.distributions(tree, study=study),
+        "fig5": lambda tree, error: against_load.multi_slope(tree, study=study),
+        "fig6": lambda tree, error: contact_maps.spots_by_slope(tree, study=study),
+        "fig7": lambda tree, error: against_load.stiffness(tree, study=study),
+        "fig8": lambda tree, error: at_one_load.patch_sizes(tree, study=study),
+        "fig10": lambda tree, error: errors.model_error(tree, error, study=study),
+        "fig11": lambda tree, error: errors.distribution_error(tree, error, study=study),
     }
     for name, draw in figures.items():
         shown, known = draw(tree, crops.errors(tree)), draw(other, crops.errors(other))

@@ -19,20 +19,7 @@ from icha.datasets.files import write_dataset
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of
 from icha.datasets.results import FIGURE_ENDINGS
-from icha.figures import (
-    ensembles,
-    fig1_jkr,
-    fig2_area_and_gap,
-    fig3_distributions,
-    fig4_contact_map,
-    fig5_multi_slope,
-    fig6_spots_by_slope,
-    fig7_stiffness,
-    fig8_patch_sizes,
-    fig9_tabor,
-    fig10_model_error,
-    fig11_distribution_error,
-)
+from icha.figures import against_load, against_parameter, at_one_load, contact_maps, ensembles, errors, one_asperity
 from icha.figures.drawn import caption_of
 from icha.figures.looks import material_colours
 from icha.figures.maps import average_blocks, wrap_circles
@@ -55,7 +42,7 @@ KIND = "reduced_pressure"
 @pytest.fixture(autouse=True)
 def densities_of_few_patches(monkeypatch):
     """The small surfaces of these tests have few patches."""
-    monkeypatch.setattr(fig8_patch_sizes, "_FEWEST_BINS", 1)
+    monkeypatch.setattr(at_one_load, "_FEWEST_BINS", 1)
 
 
 def truth(area=1.5):
@@ -65,9 +52,9 @@ def truth(area=1.5):
 
 
 def test_same_bytes_twice_whatever_the_users_settings(tmp_path):
-    save(fig1_jkr.figure(), tmp_path / "a.png", tmp_path / "a.pdf")
+    save(one_asperity.jkr(), tmp_path / "a.png", tmp_path / "a.pdf")
     with mpl.rc_context({"font.size": 30, "lines.linewidth": 9, "axes.grid": True, "savefig.dpi": 33}):
-        save(fig1_jkr.figure(), tmp_path / "b.png", tmp_path / "b.pdf")
+        save(one_asperity.jkr(), tmp_path / "b.png", tmp_path / "b.pdf")
     for kind in ("png", "pdf"):
         one, two = ((tmp_path / f"{each}.{kind}").read_bytes() for each in "ab")
         assert one == two
@@ -76,7 +63,7 @@ def test_same_bytes_twice_whatever_the_users_settings(tmp_path):
 
 
 def test_fig1_passes_through_the_known_points():
-    axes = fig1_jkr.figure(tabor_parameter=3.0).axes[0]
+    axes = one_asperity.jkr(tabor_parameter=3.0).axes[0]
     marks = {text.get_text(): text.xy for text in axes.texts if text.get_text() in "ABC" and text.get_text()}
     assert marks["C"] == pytest.approx((-1.608772, -5 * np.pi / 6), abs=1e-5)
     assert marks["B"] == pytest.approx((-0.773417, -1.5 * np.pi), abs=1e-5)
@@ -99,7 +86,7 @@ def test_the_state_of_pull_off_can_be_drawn():
     run["snapshot_target"].values[1] = 0.0
     run["snapshot_step"].values[1] = run.sizes["step"] - 2
     tree = campaign_tree([(LABELS, run)])
-    figure = fig3_distributions.figure(tree, study="one", kind="pull_off")
+    figure = at_one_load.distributions(tree, study="one", kind="pull_off")
     assert any("pull-off" in axes.get_title(loc="right") for axes in figure.axes)
     assert "Persson" not in legend(figure)
 
@@ -108,15 +95,15 @@ def test_fig3_points_keep_the_probability():
     run = small.run()
     for at, step in enumerate(run["snapshot_step"].values.astype(int)):
         edges = run["gap_bin_edges"].values / float(run["rms_height"])
-        u, (density,) = fig3_distributions.gap_densities([(run, at)])
+        u, (density,) = at_one_load.gap_densities([(run, at)])
         assert np.all(np.diff(u) > 0) and np.all(density > 0)
         assert edges[1] < u[0] and u[-1] < edges[-1]
-        p, (density,) = fig3_distributions.pressure_densities([(run, at)])
+        p, (density,) = at_one_load.pressure_densities([(run, at)])
         width = np.diff(run["pressure_bin_edges"].values) / float(run["contact_modulus"] * run["rms_slope"])
         filled = width[run["pressure_density"].values[at] > 0]
         assert np.sum(density * filled) == pytest.approx(run["contact_area_fraction"].values[step], rel=1e-9)
         assert p.min() < 0, "adhesion pulls at the edges"
-    assert fig3_distributions.pressure_densities([(small.run(material="hertz"), 0)])[0].min() > 0
+    assert at_one_load.pressure_densities([(small.run(material="hertz"), 0)])[0].min() > 0
 
 
 def test_the_singular_tail_is_that_of_jkr_spots():
@@ -124,7 +111,7 @@ def test_the_singular_tail_is_that_of_jkr_spots():
     run = small.run()
     unit = float(run["contact_modulus"]) * float(run["rms_slope"])
     run = run.assign(spot_perimeter=2 * np.pi * run["spot_radius"], resolved_tension=100 * unit)
-    p, tail = fig3_distributions.singular_tail([(run, 0)], -500)
+    p, tail = at_one_load.singular_tail([(run, 0)], -500)
     edges = run["pressure_bin_edges"].values / unit
     middle = -np.sqrt(np.abs(edges[1:] * edges[:-1]))
     # The first bin also counts all lower pressures.
@@ -156,7 +143,7 @@ def test_fig5_draws_measurements_over_the_curves(tmp_path):
     (tmp_path / "other.csv").write_text("p, a\n1e-3, 3e-3\n1e-2, 3e-2\n2e-2, 5e-2\n")
     measured = {"columns": {"p": 1e3, "a": 0.01}, "contact_modulus": 5e6, "material": "soft", "rms_slope": 0.2}
     without_slope = {"columns": {"p": 1.0, "a": 1.0}, "contact_modulus": None, "material": None, "rms_slope": None}
-    left, right = fig5_multi_slope.figure(
+    left, right = against_load.multi_slope(
         small.tree(),
         [tmp_path / "one.csv", tmp_path / "other.csv"],
         study="slopes",
@@ -178,7 +165,7 @@ def test_fig5_contains_measurements_far_from_the_curves(tmp_path):
     (tmp_path / "far.csv").write_text("p, a\n1e-3, 0.02\n1e-2, 0.3\n")
     far = {"columns": {"p": 1.0, "a": 1.0}, "contact_modulus": None, "material": None, "rms_slope": None}
     tables, measurements = [tmp_path / "far.csv"], [far | {"label": "far", "citation": "Someone"}]
-    _, right = fig5_multi_slope.figure(small.tree(), tables, study="slopes", measurements=measurements).axes
+    _, right = against_load.multi_slope(small.tree(), tables, study="slopes", measurements=measurements).axes
     low, high = right.get_ylim()
     assert low < 20 and high > 30
 
@@ -197,13 +184,13 @@ def test_the_caption_names_the_measurements_of_fig5(tmp_path):
 
 def test_values_that_the_campaign_lacks_are_named_with_those_it_has():
     with pytest.raises(NothingToDraw, match="no complete run has material steel; complete runs have material soft"):
-        fig6_spots_by_slope.figure(small.tree(), study="slopes", material="steel")
+        contact_maps.spots_by_slope(small.tree(), study="slopes", material="steel")
 
 
 def test_fig7_is_the_slope_of_fig2_whatever_the_rms_slope():
     # Without adhesion p* against u/h_rms is one curve for all slopes of a topography, and so is its derivative.
     one, other = (
-        dict(zip(*np.round(fig7_stiffness.stiffness_points(small.run(rms_slope=s, material="hertz")), 12), strict=True))
+        dict(zip(*np.round(against_load.STIFFNESS.points(small.run(rms_slope=s, material="hertz")), 12), strict=True))
         for s in (1.0, 0.2)
     )
     common = sorted(set(one) & set(other))
@@ -215,7 +202,7 @@ def test_fig7_leaves_out_what_has_no_logarithm():
     run = small.run().copy(deep=True)
     run["contact_stiffness"].values[0] *= -1
     run["reduced_pressure"].values[1] = -1e-4
-    p, stiffness = fig7_stiffness.stiffness_points(run)
+    p, stiffness = against_load.STIFFNESS.points(run)
     assert len(p) == len(stiffness) == run.sizes["step"] - 2
 
 
@@ -223,19 +210,19 @@ def test_fig8_density_and_counts_of_a_known_distribution():
     # Quantiles of n(A) ~ A^-2 between 1 and 1000, on a nominal area of 50.
     count, nominal = 20000, 50.0
     area = np.sort(1 / (1 - (np.arange(count) + 0.5) / count * (1 - 1e-3)))
-    at, (density,) = fig8_patch_sizes.patch_density([area], nominal)
+    at, (density,) = at_one_load.patch_density([area], nominal)
     exact = count / nominal / (1 - 1e-3) / at**2
     np.testing.assert_allclose(density[at < 100], exact[at < 100], rtol=0.03)
-    at, (above,) = fig8_patch_sizes.patches_above([area], nominal)
+    at, (above,) = at_one_load.patches_above([area], nominal)
     assert at[0] == area[0] and at[-1] == area[-1] and len(at) <= 300
     np.testing.assert_allclose(above * nominal, [np.count_nonzero(area >= a) for a in at])
 
 
 @pytest.mark.parametrize("areas", [[], [2.0], [1.0, 2.0, 5.0]])
 def test_fig8_of_few_patches(areas):
-    at, (density,) = fig8_patch_sizes.patch_density([np.array(areas)], 10.0)
+    at, (density,) = at_one_load.patch_density([np.array(areas)], 10.0)
     assert len(at) == min(len(areas), 1) and np.all(np.isfinite(density))
-    at, (above,) = fig8_patch_sizes.patches_above([np.array(areas)], 10.0)
+    at, (above,) = at_one_load.patches_above([np.array(areas)], 10.0)
     assert len(at) == len(above) == len(areas)
 
 
@@ -247,20 +234,20 @@ def test_fig9_joins_runs_that_differ_in_range_and_shows_the_adhesionless_one(mon
         path = icha.Path(reduced_pressures=[1e-2], max_step=0.2)
         runs[name] = icha.simulate(small.surface(), material, path, seed=1)
     tree = campaign_tree([(RunLabels("tabor", "asperities", "rough", 1, 1.0, name), run) for name, run in runs.items()])
-    left, right = fig9_tabor.figure(tree, study="tabor").axes
+    left, right = against_parameter.tabor(tree, study="tabor").axes
     for axes, name in ((left, "contact_area_fraction"), (right, "reduced_separation")):
         curve, bare = axes.get_lines()
         expected = [(float(run["tabor_parameter"]), run[name].values[-1]) for run in (runs["long"], runs["short"])]
         np.testing.assert_array_equal(curve.get_xydata(), expected)
         assert set(bare.get_ydata()) == {float(runs["bare"][name].values[-1])}
     assert curve.get_xdata()[1] == pytest.approx(4 * curve.get_xdata()[0])
-    monkeypatch.setattr(fig9_tabor, "_SPAN", 3.9)
-    assert (left.get_xscale(), fig9_tabor.figure(tree, study="tabor").axes[0].get_xscale()) == ("linear", "log")
+    monkeypatch.setattr(against_parameter, "_TABOR_SPAN", 3.9)
+    assert (left.get_xscale(), against_parameter.tabor(tree, study="tabor").axes[0].get_xscale()) == ("linear", "log")
     # The range is along the axis, and not in the name.
     assert len(legend(left.figure)) == 2 and not any("range" in name for name in legend(left.figure))
     tree = campaign_tree([(RunLabels("tabor", "asperities", "rough", 1, 1.0, "bare"), runs["bare"])])
     with pytest.raises(ValueError, match="study tabor: no run with adhesion is complete"):
-        fig9_tabor.figure(tree, study="tabor")
+        against_parameter.tabor(tree, study="tabor")
 
 
 def test_fig2_compares_curves_whose_first_area_is_reached_in_tension():
@@ -268,7 +255,7 @@ def test_fig2_compares_curves_whose_first_area_is_reached_in_tension():
     sign = xr.where(np.arange(runs[0][1].sizes["step"]) == 0, -1.0, 1.0)
     tensile = {name: runs[0][1][name] * sign for name in ("reduced_pressure", "nominal_pressure")}
     runs[0] = runs[0][0], runs[0][1].assign(tensile)
-    figure = fig2_area_and_gap.figure(campaign_tree(runs), study="one")
+    figure = against_load.area_and_gap(campaign_tree(runs), study="one")
     assert len(figure.axes) == 4 and figure.axes[2].get_lines()
 
 
@@ -276,7 +263,7 @@ def test_fig2_draws_theories_of_separate_summits_where_there_are_any():
     moments = spectral_moments(small.surface())
     adhesive = {(1.0, "soft"): small.MATERIALS["soft"], (1.0, "other"): icha.Material(1e6, 0.02, 2e-9)}
     references = reference_dataset(small.SPECTRUM, moments, adhesive)
-    figure = fig2_area_and_gap.figure(compared.tree_at_finite_range(), references, study="one")
+    figure = against_load.area_and_gap(compared.tree_at_finite_range(), references, study="one")
     names = legend(figure)
     assert {"Greenwood & Williamson", "Fuller & Tabor", "Yang & Persson", "boundary elements at finite range"} <= set(
         names
@@ -285,7 +272,7 @@ def test_fig2_draws_theories_of_separate_summits_where_there_are_any():
     # Published points are those of another surface.
     assert "GFMD, no adhesion" not in names
     published = icha.SelfAffineSpectrum(period=1e-4, rolloff_wavelength=1e-4, short_wavelength=1e-6, hurst=0.8)
-    other = fig2_area_and_gap.figure(small.tree(), reference_dataset(published), study="slopes")
+    other = against_load.area_and_gap(small.tree(), reference_dataset(published), study="slopes")
     assert "GFMD, no adhesion" in legend(other)
     for axes, name in zip(figure.axes[:2], ("summit_area_fraction", "reduced_separation"), strict=True):
         drawn = [line for line in axes.get_lines() if line.get_linewidth() == 0.8 and len(line.get_xdata())]
@@ -301,17 +288,17 @@ def test_fig2_draws_theories_of_separate_summits_where_there_are_any():
 
 def test_fig3_shows_boundary_elements_of_the_same_state():
     tree, colours = compared.tree_of_both(), material_colours(compared.tree())
-    axes = fig3_distributions.figure(tree, study="one", target=3e-3).axes
+    axes = at_one_load.distributions(tree, study="one", target=3e-3).axes
     (left, *_), (right, *_) = (lines_of(panel, "+") for panel in axes)
     members = [(run, 0) for labels, run in compared.runs().items() if labels.material == "soft"]
-    u, densities = fig3_distributions.gap_densities(members)
+    u, densities = at_one_load.gap_densities(members)
     np.testing.assert_allclose(left.get_xydata(), np.transpose([u, densities.mean(axis=0)]), rtol=1e-9)
     assert right.get_xdata().min() < 0 and left.get_color() == right.get_color() == colours["soft"]
 
 
 def test_fig4_puts_the_contact_of_boundary_elements_beside_the_spots(surface):
     beside, run = truth(), compared.runs()[LABELS]
-    figure = fig4_contact_map.figure(compared.tree(), surface, beside, run=LABELS, target=1e-2, kind=KIND)
+    figure = contact_maps.contact_map(compared.tree(), surface, beside, run=LABELS, target=1e-2, kind=KIND)
     assert len(figure.axes) == 5  # four panels and the scale of heights
     area = 1.5 * float(run["contact_area_fraction"].values[-1])
     assert figure.axes[1].get_title(loc="right") == f"boundary elements, $A/A_0$ = {area:.3f}"
@@ -326,7 +313,7 @@ def test_fig4_puts_the_contact_of_boundary_elements_beside_the_spots(surface):
     assert (both + asperities, both + elements) == (np.count_nonzero(covered), np.count_nonzero(contact))
     assert figure.axes[3].get_title(loc="right").endswith(f"{jaccard(covered, contact):.2f}")
     # If the path of boundary elements ended before, the spots stand alone.
-    ended = fig4_contact_map.figure(
+    ended = contact_maps.contact_map(
         compared.tree(), surface, beside.isel(snapshot=[0]), run=LABELS, target=1e-2, kind=KIND
     )
     assert len(ended.axes) == 3
@@ -338,7 +325,7 @@ def test_fig5_marks_boundary_elements_of_the_study_or_of_another():
     own = compared.own_patches(run, area=1.5)
     for study, options in (("slopes", {}), ("truth", {"boundary_elements": "truth"})):
         beside = labels._replace(study=study, model="boundary_elements")
-        figure = fig5_multi_slope.figure(campaign_tree([*runs, (beside, own)]), study="slopes", **options)
+        figure = against_load.multi_slope(campaign_tree([*runs, (beside, own)]), study="slopes", **options)
         for axes, factor in zip(figure.axes, (labels.rms_slope, 1.0), strict=True):
             (crosses,) = lines_of(axes, "+")
             np.testing.assert_allclose(crosses.get_xdata(), factor * np.array(small.PRESSURES), rtol=1e-6)
@@ -353,7 +340,7 @@ def test_fig5_marks_boundary_elements_of_the_study_or_of_another():
 
 
 def test_fig10_shows_means_and_seeds_of_the_errors_in_per_cent():
-    left, right = fig10_model_error.figure(compared.tree(), compared.errors(), study="one").axes
+    left, right = errors.model_error(compared.tree(), compared.errors(), study="one").axes
     expected = 100 * (1 / np.array(list(compared.AREA_FACTORS.values())) - 1)
     (adhesive, _, bars), (bare, _, _) = left.containers
     np.testing.assert_allclose(adhesive.get_ydata(), expected.mean())
@@ -374,13 +361,13 @@ def test_errors_of_runs_that_all_failed_are_nothing_to_draw():
         for name, node in compared.errors().children.items()
     }
     with pytest.raises(NothingToDraw, match="study one: no run that was compared with boundary elements is complete"):
-        fig11_distribution_error.figure(compared.tree(), xr.DataTree.from_dict(empty), study="one")
+        errors.distribution_error(compared.tree(), xr.DataTree.from_dict(empty), study="one")
 
 
 def test_surfaces_of_different_slopes_are_compared_at_their_own_alone():
-    errors = compared.errors_at_own_slopes()
-    assert errors["one"].sizes["surface"] == errors["one"].sizes["rms_slope"] == 2
-    figure = fig10_model_error.figure(compared.tree(), errors, study="one")
+    error = compared.errors_at_own_slopes()
+    assert error["one"].sizes["surface"] == error["one"].sizes["rms_slope"] == 2
+    figure = errors.model_error(compared.tree(), error, study="one")
     assert len(figure.axes[0].containers) == 4
     names = legend(figure)
     assert sum("other" in name for name in names) == sum("rough" in name for name in names) == 2
@@ -392,7 +379,7 @@ def test_only_complete_runs_are_drawn():
     tree = campaign_tree([ended[0], *runs[1:]])
     assert {labels for labels, _ in select_runs(tree, "slopes")} == {labels for labels, _ in runs[1:]}
     with pytest.raises(NothingToDraw, match="study slopes: no run is complete"):
-        fig5_multi_slope.figure(campaign_tree(ended), study="slopes")
+        against_load.multi_slope(campaign_tree(ended), study="slopes")
 
 
 def test_formatted_numbers_and_units():
@@ -419,7 +406,7 @@ def many_seeds(count=5):
 
 
 def test_fig2_shows_means_with_bands_that_stay_above_zero():
-    figure = fig2_area_and_gap.figure(many_seeds(), study="many")
+    figure = against_load.area_and_gap(many_seeds(), study="many")
     for axes, name in zip(figure.axes[:2], ("contact_area_fraction", "reduced_separation"), strict=True):
         (mean,) = [line for line in axes.get_lines() if len(line.get_xdata()) == len(small.PRESSURES)]
         ratio = axes is figure.axes[0]
@@ -433,7 +420,7 @@ def test_fig2_shows_means_with_bands_that_stay_above_zero():
 
 
 def test_few_seeds_have_no_band_and_are_drawn_themselves():
-    figure = fig2_area_and_gap.figure(compared.tree(), study="one")
+    figure = against_load.area_and_gap(compared.tree(), study="one")
     for axes, name in zip(figure.axes[:2], ("contact_area_fraction", "reduced_separation"), strict=True):
         assert not shaded(axes)
         for material, colour in material_colours(compared.tree()).items():
@@ -450,14 +437,14 @@ def test_few_seeds_have_no_band_and_are_drawn_themselves():
 
 
 def test_fig2_shows_below_what_the_logarithmic_axes_hide():
-    figure = fig2_area_and_gap.figure(compared.tree_of_both(area=1.5, separation=0.9), study="one")
+    figure = against_load.area_and_gap(compared.tree_of_both(area=1.5, separation=0.9), study="one")
     for axes, factor in zip(figure.axes[2:], (1.5, 0.9), strict=True):
         means = lines_of(axes, "o")
         assert len(means) == 2 and "BEM" in axes.get_ylabel() and axes.get_yscale() == "linear"
         for line in means:
             np.testing.assert_allclose(line.get_ydata(), 100 * (1 / factor - 1), rtol=1e-9)
             np.testing.assert_allclose(line.get_xdata(), compared.PRESSURES, rtol=1e-9)
-    assert len(fig2_area_and_gap.figure(small.tree(), study="slopes").axes) == 2
+    assert len(against_load.area_and_gap(small.tree(), study="slopes").axes) == 2
 
 
 def test_fig2_compares_models_at_equal_loads_whatever_their_stops():
@@ -465,7 +452,7 @@ def test_fig2_compares_models_at_equal_loads_whatever_their_stops():
     truth = compared.own_patches(run, area=1.5)
     truth["reduced_pressure"] = 1.1 * truth["reduced_pressure"]
     both = campaign_tree([(LABELS, run), (LABELS._replace(model="boundary_elements"), truth)])
-    figure = fig2_area_and_gap.figure(both, study="one")
+    figure = against_load.area_and_gap(both, study="one")
     (crosses,) = lines_of(figure.axes[0], "+")
     np.testing.assert_allclose(crosses.get_xdata(), 1.1 * np.array(compared.PRESSURES), rtol=1e-9)
     # The lowest load lies below all of boundary elements; between two points logarithms are interpolated linearly.
@@ -477,7 +464,7 @@ def test_fig2_compares_models_at_equal_loads_whatever_their_stops():
 
 def test_patches_of_boundary_elements_stand_beside_those_of_asperities():
     tree = compared.tree_of_both()
-    figure = fig8_patch_sizes.figure(tree, study="one", target=3e-3)
+    figure = at_one_load.patch_sizes(tree, study="one", target=3e-3)
     for axes in figure.axes:
         dashed = [line for line in axes.get_lines() if line.is_dashed()]
         assert {line.get_color() for line in dashed} == set(material_colours(tree).values())
@@ -485,12 +472,12 @@ def test_patches_of_boundary_elements_stand_beside_those_of_asperities():
         for line in dashed:  # made of the same states
             assert any(np.array_equal(line.get_xydata(), own) for own in solid)
     assert {"asperities", "boundary elements"} <= set(legend(figure))
-    assert "boundary elements" not in legend(fig8_patch_sizes.figure(compared.tree(), study="one"))
+    assert "boundary elements" not in legend(at_one_load.patch_sizes(compared.tree(), study="one"))
 
 
-@pytest.mark.parametrize("module", [fig2_area_and_gap, fig8_patch_sizes])
+@pytest.mark.parametrize("module", [against_load.area_and_gap, at_one_load.patch_sizes])
 def test_figures_of_boundary_elements_alone_call_them_so(module):
-    figure = module.figure(campaign_tree(compared.patches()), study="one")
+    figure = module(campaign_tree(compared.patches()), study="one")
     assert legend(figure).count("boundary elements") == 1 and "asperities" not in legend(figure)
     markers = {line.get_marker() for line in figure.axes[0].get_lines()}
     assert "+" in markers and "o" not in markers
@@ -502,14 +489,14 @@ def test_a_material_has_one_colour_and_a_model_one_marker_in_all_figures_of_a_ca
         (RunLabels("first", *labels[1:]), run) for labels, run in compared.runs().items() if labels.material == "hertz"
     ]
     tree = campaign_tree([*first, *compared.runs().items(), *compared.patches(area=1.5)])
-    errors = compared.errors()
+    error = compared.errors()
     colours = material_colours(tree)
     assert list(colours) == ["hertz", "soft"] and len(set(colours.values())) == 2
     for figure in (
-        fig2_area_and_gap.figure(tree, study="one"),
-        fig8_patch_sizes.figure(tree, study="one"),
-        fig9_tabor.figure(tree, study="one"),
-        fig10_model_error.figure(tree, errors, study="one"),
+        against_load.area_and_gap(tree, study="one"),
+        at_one_load.patch_sizes(tree, study="one"),
+        against_parameter.tabor(tree, study="one"),
+        errors.model_error(tree, error, study="one"),
     ):
         adhesive = next(k for k, name in enumerate(legend(figure)) if "= 50 mJ/m²" in name)
         handle = figure.legends[0].legend_handles[adhesive]
@@ -536,7 +523,7 @@ def test_differences_end_at_the_largest_load_that_both_models_reach():
     truth = compared.own_patches(run)
     truth = truth.assign(reduced_pressure=smaller * truth["reduced_pressure"])
     runs.append((labels._replace(model="boundary_elements"), truth))
-    panels = fig2_area_and_gap.figure(campaign_tree(runs), study="slopes").axes
+    panels = against_load.area_and_gap(campaign_tree(runs), study="slopes").axes
     drawn = [line.get_xdata() for line in panels[2].get_lines() if line.get_marker() == "o"]
     assert max(map(max, drawn)) == pytest.approx(smaller * max(small.PRESSURES))
 
@@ -546,31 +533,29 @@ def test_fig4_does_not_show_another_run_where_its_own_failed(surface):
     runs[0] = (runs[0][0], runs[0][1].assign_attrs(incomplete="no equilibrium"))
     tree = campaign_tree(runs)
     with pytest.raises(NothingToDraw, match="one/rough/seed1/slope1/soft: this run is not complete"):
-        fig4_contact_map.figure(tree, surface, run=LABELS)
+        contact_maps.contact_map(tree, surface, run=LABELS)
 
 
 def test_a_density_of_fewer_than_three_bins_is_not_drawn(monkeypatch):
-    monkeypatch.setattr(fig8_patch_sizes, "_FEWEST_BINS", 3)
-    (alone,) = fig8_patch_sizes.figure(small.tree(), study="single").axes
+    monkeypatch.setattr(at_one_load, "_FEWEST_BINS", 3)
+    (alone,) = at_one_load.patch_sizes(small.tree(), study="single").axes
     assert alone.get_lines() and "patches larger" in alone.get_ylabel()
     assert "seed" not in alone.get_title(loc="right") and "A_0" in alone.get_title(loc="right")
 
 
 def caption_of_fig2(study, **data):
     units = {"units": data.pop("units")} if "units" in data else {}
-    return caption_of(fig2_area_and_gap.figure(**data, study=study, **units))
+    return caption_of(against_load.area_and_gap(**data, study=study, **units))
 
 
 def test_captions_state_only_what_the_figure_contains():
     tree = small.tree()
     bare = caption_of_fig2("slopes", campaign=tree)
     assert "Open shapes are without adhesion." in bare and "boundary elements" not in bare
-    assert "Lines and symbols are means" not in bare and "Thin dashed" not in bare and "theories" not in bare
+    assert "Results are means" not in bare and "Thin dashed" not in bare and "theories" not in bare
     assert "Ratio of contact area and load (a)" in bare and "mean separation divided by rms height (b)" in bare
     seeds = caption_of_fig2("single", campaign=tree)
-    assert (
-        "Lines and symbols are means over the seeds" in seeds and "Pale thin lines" in seeds and "A band" not in seeds
-    )
+    assert "Results are means over the seeds" in seeds and "Pale thin lines" in seeds and "A band" not in seeds
     both = caption_of_fig2("one", campaign=compared.tree_of_both())
     assert "Panels (c) and (d) show" in both and "Open shapes" in both and "three arms" not in both
     assert "in the limit of a short range" in both and "range of attraction of the material" not in both
@@ -586,7 +571,7 @@ def test_fig2_compares_the_estimate_from_bare_runs_with_adhesive_boundary_elemen
         run = icha.simulate(small.surface(1), small.MATERIALS[material], path, seed=1)
         for model, each in (("asperities", run), ("boundary_elements", compared.own_patches(run))):
             runs[RunLabels("one", model, "rough", 1, 1.0, material)] = each
-    fig = fig2_area_and_gap.figure(campaign_tree(runs.items()), study="one")
+    fig = against_load.area_and_gap(campaign_tree(runs.items()), study="one")
     names = [text.get_text() for text in fig.legends[0].get_texts()]
     assert "Ciavarella, from runs without adhesion" in names
     areas = [line for line in fig.axes[2].get_lines() if line.get_linewidth() == pytest.approx(0.9)]
@@ -600,10 +585,10 @@ def test_single_seeds_are_drawn_only_beside_few_curves(monkeypatch):
         return [line for line in fig.axes[0].get_lines() if line.get_linewidth() == 0.5 and len(line.get_xdata())]
 
     tree = compared.tree()
-    fig = fig2_area_and_gap.figure(tree, study="one")
+    fig = against_load.area_and_gap(tree, study="one")
     assert thin(fig) and "single seeds" in fig.legends[0].get_texts()[-1].get_text()
     monkeypatch.setattr(ensembles, "MOST_SCATTERED", 1)
-    fig = fig2_area_and_gap.figure(tree, study="one")
+    fig = against_load.area_and_gap(tree, study="one")
     names = [text.get_text() for text in fig.legends[0].get_texts()]
     assert not thin(fig) and "means over the seeds, n = 3" in names
 
@@ -617,7 +602,7 @@ def test_captions_name_the_units_and_the_models_that_are_drawn():
 
 def test_fig2_in_physical_units_has_pressures_and_gaps_with_units():
     references = reference_dataset(small.SPECTRUM, spectral_moments(small.surface()), {})
-    left, right = fig2_area_and_gap.figure(small.tree(), references, study="single", units="physical").axes
+    left, right = against_load.area_and_gap(small.tree(), references, study="single", units="physical").axes
     assert left.get_xlabel() == label_of("nominal_pressure", "kPa") and right.get_ylabel() == label_of("mean_gap", "µm")
     load, values = at_common([small.run(seed) for seed in (1, 2)])
     (mean,) = (line for line in right.get_lines() if line.get_marker() == "o" and len(line.get_xdata()) == len(load))
@@ -627,7 +612,7 @@ def test_fig2_in_physical_units_has_pressures_and_gaps_with_units():
     p = theory.get_xdata() * 1e3 / small.MATERIALS["soft"].contact_modulus
     expected = np.interp(p, references["reduced_pressure"], references["persson_area_fraction"])
     np.testing.assert_allclose(theory.get_ydata(), expected, rtol=1e-6)
-    several = fig2_area_and_gap.figure(small.tree(), references, study="slopes", units="physical").axes[0]
+    several = against_load.area_and_gap(small.tree(), references, study="slopes", units="physical").axes[0]
     assert "Persson" not in [line.get_label() for line in several.get_lines()]
 
 
@@ -643,5 +628,5 @@ def test_fig7_has_no_legend_of_a_material_without_points():
     changed = [
         (k, r.assign(contact_stiffness=-r["contact_stiffness"]) if k.material == "hertz" else r) for k, r in runs
     ]
-    names = legend(fig7_stiffness.figure(campaign_tree(changed), study="slopes"))
+    names = legend(against_load.stiffness(campaign_tree(changed), study="slopes"))
     assert any("mJ/m²" in name for name in names) and not any("gamma$ = 0" in name for name in names)

@@ -12,13 +12,13 @@ from icha.contact.models import REFERENCE_MODEL
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of
-from icha.figures import fig13_loops, fig14_pull_off, fig15_loss, fig16_snap_map
+from icha.figures import against_parameter, contact_maps, loops
+from icha.figures.against_parameter import PARTS, fit_line, shares
 from icha.figures.drawn import caption_of
 from icha.figures.ensembles import Points
-from icha.figures.fig15_loss import PARTS, fit_line, shares
 from icha.figures.select import ContactRuns, select_unloaded_runs
 
-MODULES = (fig13_loops, fig14_pull_off, fig15_loss)
+MODULES = (loops.loops, against_parameter.pull_off, against_parameter.loss)
 NAMES = (("reduced_separation", "reduced_pressure"), ("reduced_pressure", "contact_area_fraction"))
 DEPTHS = {"gentle": -0.6, "middle": -0.1, "hard": 0.5}
 
@@ -36,11 +36,11 @@ def one(material="sticky", **changed):
 
 
 def draw(module, tree, study):
-    return module.figure(tree, **({"studies": [study]} if module is fig15_loss else {"study": study}))
+    return module(tree, **({"studies": [study]} if module is against_parameter.loss else {"study": study}))
 
 
 def snap_map(tree, surface, study="one"):
-    return fig16_snap_map.figure(tree, surface, run=(study, "asperities", "rough", 1, 0.5, "sticky"))
+    return contact_maps.snap_map(tree, surface, run=(study, "asperities", "rough", 1, 0.5, "sticky"))
 
 
 def curves(axes):
@@ -58,7 +58,7 @@ def marks(axes):
 
 def test_fig13_draws_loading_unloading_and_the_pull_off():
     run = separate.run("sticky", 0.5)
-    figure = fig13_loops.figure(one(), study="one")
+    figure = loops.loops(one(), study="one")
     turn, at = int(np.flatnonzero(run["leg"].values == 0)[-1]), int(np.argmin(run["nominal_pressure"].values))
     for axes, names in zip(figure.axes, NAMES, strict=True):
         x, y = (run[name].values for name in names)
@@ -77,7 +77,7 @@ def test_fig13_draws_loading_unloading_and_the_pull_off():
 
 def test_fig13_in_physical_units_has_separations():
     """On a free square, the mean separation is not the mean gap."""
-    left = fig13_loops.figure(one(), study="one", units="physical").axes[0]
+    left = loops.loops(one(), study="one", units="physical").axes[0]
     assert left.get_xlabel().startswith(label_of("mean_separation"))
 
 
@@ -85,7 +85,7 @@ def test_fig13_follows_the_exact_law_between_distant_states():
     contact = separate.Asperities(separate.MATERIALS["sticky"])
     labels = RunLabels("one", "asperities", "rough", 1, 1.0, "sticky")
     campaign = separate.tree([(labels, contact.run(0.5, points=6))])
-    (loading,), _ = curves(fig13_loops.figure(campaign, study="one").axes[0])
+    (loading,), _ = curves(loops.loops(campaign, study="one").axes[0])
     u, p = loading.get_data()
     states = np.arange(0, len(u), 8)
     # At a state, the pressure may jump.
@@ -102,7 +102,7 @@ def test_fig13_without_adhesion_has_no_hysteresis_and_rounding_is_no_pull_off():
     tiny = {name: run[name].copy(deep=True) for name in ("nominal_pressure", "reduced_pressure")}
     for values in tiny.values():
         values.values[-2] = -1e-52
-    figure = fig13_loops.figure(one("hertz", **tiny), study="one")
+    figure = loops.loops(one("hertz", **tiny), study="one")
     (solid,), (dashed,) = curves(figure.axes[0])
     loading = np.interp(dashed.get_xdata(), solid.get_xdata()[::-1], solid.get_ydata()[::-1])
     np.testing.assert_allclose(dashed.get_ydata(), loading, atol=1e-12)
@@ -119,7 +119,7 @@ def test_loops_of_free_squares_are_along_the_mean_separation():
 
 def test_fig13_shows_one_surface_and_seed(tree):
     run = separate.run("sticky", 0.5, seed=2, depth=0.5)
-    figure = fig13_loops.figure(tree, study="hard", seed=2)
+    figure = loops.loops(tree, study="hard", seed=2)
     solid, dashed = curves(figure.axes[0])
     assert len(solid) == len(dashed) == 2
     deepest = run["reduced_pressure"].values[np.flatnonzero(run["leg"].values == 0)[-1]]
@@ -127,7 +127,7 @@ def test_fig13_shows_one_surface_and_seed(tree):
     assert len({line.get_color() for line in solid}) == 2
     assert figure.get_suptitle() == "asperities, rough, seed 2"
     with pytest.raises(ValueError, match="no complete run has seed 7; complete runs have seed 1, 2"):
-        fig13_loops.figure(tree, study="hard", seed=7)
+        loops.loops(tree, study="hard", seed=7)
 
 
 @pytest.mark.parametrize(
@@ -142,7 +142,7 @@ def test_fig13_draws_boundary_elements_over_their_run(name, markers):
     truth = shown.assign_attrs(contact_model="boundary_elements", attraction=attraction)
     truth = truth.assign(reduced_pressure=1.1 * truth["reduced_pressure"])
     both = campaign_tree([(own, shown), (own._replace(study="truth", model="boundary_elements"), truth)])
-    figure = fig13_loops.figure(both, study="hard", boundary_elements="truth")
+    figure = loops.loops(both, study="hard", boundary_elements="truth")
     for axes, names in zip(figure.axes, NAMES, strict=False):
         crosses = [line for line in marks(axes) if line.get_markersize() < 4]
         assert [line.get_marker() for line in crosses] == markers
@@ -154,7 +154,7 @@ def test_fig13_draws_boundary_elements_over_their_run(name, markers):
 
 
 def test_fig14_shows_means_and_scatter_over_the_seeds(tree):
-    figure = fig14_pull_off.figure(tree, study="slopes", load_studies=list(DEPTHS))
+    figure = against_parameter.pull_off(tree, study="slopes", load_studies=list(DEPTHS))
     left, right = figure.axes
     factor, quantity = 1e-3, "pull_off_pressure"
     (sticky, bare), slopes = left.containers, (0.5, 1.0)
@@ -187,7 +187,7 @@ def test_fig14_shows_means_and_scatter_over_the_seeds(tree):
 def test_fig14_shows_boundary_elements_beside_asperities():
     runs = separate.study("one", materials=("sticky",))
     runs += [(labels._replace(model="boundary_elements"), run) for labels, run in runs]
-    figure = fig14_pull_off.figure(separate.tree(runs), study="one")
+    figure = against_parameter.pull_off(separate.tree(runs), study="one")
     (asperities, *_), (truth, *_) = figure.axes[0].containers
     assert (asperities.get_marker(), truth.get_marker()) == ("o", "x")
     np.testing.assert_array_equal(asperities.get_ydata(), truth.get_ydata())
@@ -195,7 +195,7 @@ def test_fig14_shows_boundary_elements_beside_asperities():
     assert {"asperities", "boundary elements"} < set(legend(figure))
 
 
-@pytest.mark.parametrize("module", [fig14_pull_off, fig15_loss])
+@pytest.mark.parametrize("module", [against_parameter.pull_off, against_parameter.loss])
 def test_captions_name_the_models_that_are_drawn(module):
     runs = separate.study("one", materials=("sticky",))
     truths = [(labels._replace(model=REFERENCE_MODEL), run) for labels, run in runs]
@@ -231,7 +231,7 @@ def linear_campaign(slope=0.4, offset=1e-3, scale=2e-5):
 
 
 def test_fig15_fits_a_straight_line_to_runs_that_differ_in_load_only():
-    figure = fig15_loss.figure(linear_campaign(), studies=["middle", "hard", "gentle"])
+    figure = against_parameter.loss(linear_campaign(), studies=["middle", "hard", "gentle"])
     axes = figure.axes[0]
     (points,) = axes.containers
     x, y = points[0].get_data()
@@ -250,11 +250,11 @@ def test_fig15_fits_a_straight_line_to_runs_that_differ_in_load_only():
 
 
 def test_fig15_fits_nothing_through_two_loads_or_other_seeds(tree):
-    assert not any("r^2" in name for name in legend(fig15_loss.figure(tree, studies=["gentle", "hard"])))
+    assert not any("r^2" in name for name in legend(against_parameter.loss(tree, studies=["gentle", "hard"])))
     runs = [
         separate.study(name, slopes=(0.5,), seeds=(k,), depth=depth) for k, (name, depth) in enumerate(DEPTHS.items())
     ]
-    figure = fig15_loss.figure(separate.tree(*runs), studies=list(DEPTHS))
+    figure = against_parameter.loss(separate.tree(*runs), studies=list(DEPTHS))
     assert not any("r^2" in name for name in legend(figure))
     assert np.count_nonzero(np.isfinite(figure.axes[0].containers[0][0].get_xdata())) == 3
 
@@ -270,7 +270,7 @@ def points(*runs):
 
 def test_points_of_a_line_are_means_over_the_seeds_that_all_have():
     line = points({1: (2.0, 10.0), 2: (4.0, 30.0), 3: (9.0, 99.0)}, {2: (1.0, 6.0), 1: (1.0, 2.0)})
-    assert line.same_seeds and line.counts == [2, 2]
+    assert line.same_seeds and np.isfinite(line.members).all()
     assert line.means.tolist() == [[1, 3], [4, 20]]
     apart = points({1: (2.0, 10.0)}, {2: (3.0, 8.0)})
     assert not apart.same_seeds and apart.means[1].tolist() == [10, 8]
@@ -278,7 +278,7 @@ def test_points_of_a_line_are_means_over_the_seeds_that_all_have():
 
 def test_fig15_needs_adhesion():
     with pytest.raises(ValueError, match="studies one: no run with adhesion"):
-        fig15_loss.figure(one("hertz"), studies=["one"])
+        against_parameter.loss(one("hertz"), studies=["one"])
 
 
 def test_fig15_parts_are_of_either_sign_and_make_up_the_whole(tree):
@@ -287,14 +287,14 @@ def test_fig15_parts_are_of_either_sign_and_make_up_the_whole(tree):
     line = [{1: run.assign(parts), 2: run.assign(parts)}, {1: run.assign(largest_reduced_pressure=-1.0)}]
     found = shares([ContactRuns(None, runs, 2, True) for runs in line])
     assert list(found.values()) == pytest.approx([0.6, 0.2, -0.2, 0, 0])
-    figure = fig15_loss.figure(one(**parts), studies=["one"])
+    figure = against_parameter.loss(one(**parts), studies=["one"])
     heights = sorted((bar.get_y(), bar.get_y() + bar.get_height()) for bar in figure.axes[1].patches)
     np.testing.assert_allclose(heights, [(0, -20), (0, 60), (60, 80)])
     assert {"jump-in", "jump-off", "coalescence"} <= set(legend(figure))
     assert not {"unattributed", "jumps at constant load"} & set(legend(figure))
 
     # Of the exact loops everything is explained by jumps, at the largest load of every line.
-    figure = fig15_loss.figure(tree, studies=list(DEPTHS))
+    figure = against_parameter.loss(tree, studies=list(DEPTHS))
     hard = [separate.run("sticky", 0.5, seed, DEPTHS["hard"]) for seed in (1, 2)]
     jump_in, jump_off = (sum(float(run[name]) for run in hard) for name in list(PARTS)[:2])
     tops = sorted(bar.get_y() + bar.get_height() for bar in figure.axes[1].patches)
@@ -359,7 +359,7 @@ def two_cycles():
 
 def test_figures_of_several_cycles_show_the_first_loading_and_the_last_unloading(surface):
     tree, deep, shallow = two_cycles()
-    axes = fig13_loops.figure(tree, study="one").axes[0]
+    axes = loops.loops(tree, study="one").axes[0]
     assert [len(lines) for lines in curves(axes)] == [2, 2]
     (pull_off,) = marks(axes)
     assert pull_off.get_ydata()[0] == shallow["reduced_pressure"].values.min() > deep["reduced_pressure"].values.min()
@@ -378,27 +378,27 @@ def test_boundary_elements_are_drawn_where_no_run_with_asperities_unloads():
     first = first.assign_attrs(beyond_model="the contact area is too large")
     truth = run.assign_attrs(contact_model=REFERENCE_MODEL)
     tree = campaign_tree([(labels, first), (labels._replace(model=REFERENCE_MODEL), truth)])
-    figure = draw(fig14_pull_off, tree, "one")
+    figure = draw(against_parameter.pull_off, tree, "one")
     assert figure.axes[0].get_title(loc="right") == "boundary elements"
     (line, *_) = [line for line in figure.axes[0].lines if line.get_marker() == "o"]
     assert 1e3 * line.get_ydata()[0] == pytest.approx(float(run["pull_off_pressure"]))  # kPa
-    assert len(curves(fig13_loops.figure(tree, study="one").axes[0])[1]) == 1
+    assert len(curves(loops.loops(tree, study="one").axes[0])[1]) == 1
 
 
 # --- all of them ------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("module", MODULES, ids=lambda module: module.__name__.split(".")[-1])
+@pytest.mark.parametrize("module", MODULES, ids=lambda module: module.__name__)
 def test_studies_that_do_not_unload_are_named(module):
     with pytest.raises(ValueError, match=r"single: no run (reached its unloading|was unloaded)"):
         draw(module, small.tree(), "single")
 
 
-@pytest.mark.parametrize("module", (fig14_pull_off, fig15_loss), ids=("fig14", "fig15"))
+@pytest.mark.parametrize("module", (against_parameter.pull_off, against_parameter.loss), ids=("fig14", "fig15"))
 def test_runs_in_contact_at_the_end_have_no_pull_off_and_no_loss(module):
     scalars = ["hysteresis_loss", "hysteresis_loss_over_surface_energy", "pull_off_pressure"]
     ((labels, run),) = separate.study("one", materials=("sticky",), slopes=(0.5,), seeds=(1,))
     partial = campaign_tree([(labels, run.isel(step=slice(0, -9)).drop_vars(scalars))])
     with pytest.raises(ValueError, match="one: no run was unloaded to complete separation"):
         draw(module, partial, "one")
-    assert len(curves(fig13_loops.figure(partial, study="one").axes[0])[1]) == 1
+    assert len(curves(loops.loops(partial, study="one").axes[0])[1]) == 1

@@ -14,17 +14,7 @@ from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import write_dataset
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of
-from icha.figures import (
-    fig2_area_and_gap,
-    fig3_distributions,
-    fig5_multi_slope,
-    fig7_stiffness,
-    fig17_force_indentation,
-    fig18_jkr_plot,
-    fig19_work_of_adhesion,
-    fig20_pressure_maps,
-    select,
-)
+from icha.figures import against_load, against_parameter, at_one_load, contact_maps, loops, select
 from icha.figures.captions import units_of_shapes
 from icha.figures.drawn import caption_of
 from icha.figures.indenter_curves import select_series
@@ -33,7 +23,7 @@ from icha.surfaces.shapes import Cone, CylinderPunch, Sphere
 SIDE, GRID, MODULUS, RADIUS = 48e-6, 48, 1e6, 1e-3
 ENERGY = (4e-6) ** 3 * MODULUS / RADIUS**2
 PULL_OFF = 1.5 * math.pi * ENERGY * RADIUS
-FIGURES = fig17_force_indentation, fig18_jkr_plot, fig19_work_of_adhesion
+FIGURES = loops.force_indentation, loops.jkr_plot, against_parameter.work_of_adhesion
 
 
 def press(shape=Sphere(RADIUS), rms=0.0, energy=ENERGY):  # noqa: B008, a frozen value
@@ -59,7 +49,7 @@ def lines(ax):
 
 
 def test_forces_are_those_of_the_runs_beside_jkr_and_hertz(campaign):
-    (ax,) = fig17_force_indentation.figure(campaign, study="press").axes
+    (ax,) = loops.force_indentation(campaign, study="press").axes
     assert ax.get_xlabel() == label_of("indentation", "nm") and ax.get_ylabel().startswith("force ")
     jkr, hertz = lines(ax)[:2]
     factor = {"µ": 1e6, "n": 1e9}[ax.get_ylabel().split("(")[1][0]]
@@ -70,7 +60,7 @@ def test_forces_are_those_of_the_runs_beside_jkr_and_hertz(campaign):
 
 
 def test_states_of_a_smooth_sphere_are_on_the_line_of_jkr(campaign):
-    fig = fig18_jkr_plot.figure(campaign, study="press")
+    fig = loops.jkr_plot(campaign, study="press")
     for ax in fig.axes:
         states, fit = lines(ax)[:2]
         np.testing.assert_allclose(states[:, 0], fit[:, 0])
@@ -84,7 +74,7 @@ def test_states_of_a_smooth_sphere_are_on_the_line_of_jkr(campaign):
 def test_the_line_of_jkr_leaves_out_shapes_without_a_radius(order):
     runs = press(), press(shape=CylinderPunch(1e-5)), press(shape=Cone(1.56))
     several, alone = tree_of(*(runs[k] for k in order)), tree_of(runs[0])
-    fig, only = (fig18_jkr_plot.figure(tree, study="press") for tree in (several, alone))
+    fig, only = (loops.jkr_plot(tree, study="press") for tree in (several, alone))
     for ax, expected in zip(fig.axes, only.axes, strict=True):
         for line, other in zip(lines(ax), lines(expected), strict=True):
             np.testing.assert_allclose(line, other)
@@ -101,7 +91,7 @@ def lenses():
 
 
 def test_each_panel_has_the_theories_of_its_own_runs(lenses):
-    figure = fig17_force_indentation.figure(lenses, study="press")
+    figure = loops.force_indentation(lenses, study="press")
     panels = {ax.get_title("right"): ax for ax in figure.axes}
     assert panels.keys() == {"small, smooth, soft", "small, smooth, dry", "large, smooth, soft"}
     factor = {"µ": 1e6, "n": 1e9}[figure.axes[0].get_ylabel().split("(")[1][0]]
@@ -118,7 +108,7 @@ def test_each_panel_has_the_theories_of_its_own_runs(lenses):
 
 
 def test_lenses_have_names_and_colours_of_their_own_and_bare_ones_are_left_out(lenses):
-    figure = fig18_jkr_plot.figure(lenses, study="press")
+    figure = loops.jkr_plot(lenses, study="press")
     (legend,) = figure.legends
     entries = [(text.get_text(), line) for text, line in zip(legend.get_texts(), legend.legend_handles, strict=True)]
     names = {text.partition(":")[0]: line.get_color() for text, line in entries if "loading" in text}
@@ -127,12 +117,12 @@ def test_lenses_have_names_and_colours_of_their_own_and_bare_ones_are_left_out(l
 
 
 def test_points_of_different_lenses_are_not_joined(lenses, campaign):
-    figure = fig19_work_of_adhesion.figure(lenses, study="press")
+    figure = against_parameter.work_of_adhesion(lenses, study="press")
     assert all(len(line) == 1 for line in lines(figure.axes[0])[:-1])
     names = [text.get_text() for text in figure.legends[0].get_texts()]
     assert {"small", "large"} < set(names) and not [name for name in names if "dry" in name]
     # A smooth and a rough sphere of the same radius are joined.
-    joined = fig19_work_of_adhesion.figure(campaign, study="press").axes[0]
+    joined = against_parameter.work_of_adhesion(campaign, study="press").axes[0]
     assert [len(line) for line in lines(joined)[:-1]].count(2) == 3
 
 
@@ -146,7 +136,7 @@ def test_states_beyond_jkr_do_not_spoil_the_axes_and_spheres_of_long_range_have_
     write_dataset(run, tmp_path / "run.nc")
     shown = CliRunner().invoke(app, ["show", str(tmp_path / "run.nc")]).output
     assert "work of adhesion on approach: no fit (Tabor parameter 0.3 below 3)" in shown
-    figure = fig18_jkr_plot.figure(tree, study="press")
+    figure = loops.jkr_plot(tree, study="press")
     lowest = min(line[:, 0].min() for ax in figure.axes for line in lines(ax))
     factor = {"k": 1e-3, "N": 1.0}[figure.axes[0].get_xlabel().split("(")[1][0]]
     assert -math.sqrt(8 * math.pi * MODULUS * ENERGY) < lowest / factor < 0
@@ -158,15 +148,15 @@ def test_states_beyond_jkr_do_not_spoil_the_axes_and_spheres_of_long_range_have_
     assert f"A smooth sphere with a Tabor parameter of {SHORT_RANGE_FROM:g} or more gives a straight line" in words
 
 
-@pytest.mark.parametrize("module", [fig2_area_and_gap, fig3_distributions, fig7_stiffness])
+@pytest.mark.parametrize("module", [against_load.area_and_gap, at_one_load.distributions, against_load.stiffness])
 def test_captions_say_that_theories_of_flat_surfaces_do_not_hold_under_a_shape(module):
     tree = tree_of(press(rms=1e-8, energy=0.0))
-    words = caption_of(module.figure(tree, study="press"))
+    words = caption_of(module(tree, study="press"))
     assert "They do not hold under a shape, so none is drawn" in words and "Persson" not in words
 
 
 def test_works_of_adhesion_of_a_smooth_sphere_are_one(campaign):
-    (ax,) = fig19_work_of_adhesion.figure(campaign, study="press").axes
+    (ax,) = against_parameter.work_of_adhesion(campaign, study="press").axes
     at_zero = [line[line[:, 0] == 0, 1] for line in lines(ax)[:-1]]
     values = np.concatenate(at_zero)
     assert len(values) == 6  # each of three quantities as a seed and as a mean
@@ -182,25 +172,25 @@ def test_fig5_draws_a_measurement_of_a_rough_sphere_where_the_run_is(tmp_path):
     known = {"columns": {"p": 1.0, "a": 1.0}, "label": "own", "citation": "A. Author (2000)"}
     known |= {"material": "soft", "rms_slope": None}
     options = {"study": "press", "measurements": [known | {"contact_modulus": MODULUS}]}
-    figure = fig5_multi_slope.figure(campaign, [tmp_path / "own.csv"], **options)
+    figure = against_load.multi_slope(campaign, [tmp_path / "own.csv"], **options)
     for ax, value in zip(figure.axes, (area, area / pressure * MODULUS), strict=True):
         assert ax.get_xlabel().startswith("relative load")
         measured = [line for line in ax.get_lines() if line.get_label() == "own"]
         np.testing.assert_allclose(measured[0].get_xydata(), [(pressure / MODULUS, value)])
         drawn = [line for line in ax.get_lines() if line not in measured]
         assert any(np.isclose(line.get_xydata(), measured[0].get_xydata()).all(axis=1).any() for line in drawn)
-    assert "relative loads F/(E* A0) take the place of reduced pressures" in caption_of(figure)
+    assert "Relative loads take the place of reduced pressures, because a surface has a shape" in caption_of(figure)
 
 
 def test_captions_state_the_units_of_shapes():
     campaign = tree_of(press(energy=0.0))
-    figure, studies = fig7_stiffness.figure(campaign, study="press"), [campaign["press"].to_dataset()]
+    figure, studies = against_load.stiffness(campaign, study="press"), [campaign["press"].to_dataset()]
     assert "the units h_rms of gaps and h'rms of loads are not those of the" in units_of_shapes(figure, studies)
 
 
 def test_maps_show_the_pressure_at_every_snapshot():
     run = press()
-    fig = fig20_pressure_maps.figure(tree_of(run), run, run=("press", "boundary_elements", "s0", 0, 0.1, "soft"))
+    fig = contact_maps.pressure_maps(tree_of(run), run, run=("press", "boundary_elements", "s0", 0, 0.1, "soft"))
     panels = [ax for ax in fig.axes if ax.get_images()]
     titles = [ax.get_title("right") for ax in panels]
     assert [title.split(",")[0] for title in titles] == ["loading", "pull-off"]
@@ -213,14 +203,14 @@ def test_maps_show_the_pressure_at_every_snapshot():
 
 def test_reasons_for_an_empty_figure():
     bare = tree_of(press(energy=0.0))
-    fig17_force_indentation.figure(bare, study="press")
+    loops.force_indentation(bare, study="press")
     for module in FIGURES[1:]:
         with pytest.raises(select.NothingToDraw, match="no sphere with adhesion"):
-            module.figure(bare, study="press")
+            module(bare, study="press")
     cone = tree_of(press(shape=Cone(1.56)))
-    assert len(lines(fig17_force_indentation.figure(cone, study="press").axes[0])) == 3  # both legs, and zero force
+    assert len(lines(loops.force_indentation(cone, study="press").axes[0])) == 3  # both legs, and zero force
     with pytest.raises(select.NothingToDraw, match="no sphere with adhesion"):
-        fig18_jkr_plot.figure(cone, study="press")
+        loops.jkr_plot(cone, study="press")
 
 
 def test_statements_on_validity_if_surfaces_have_slopes_of_their_own():

@@ -9,6 +9,7 @@ import pytest
 import small_campaign as small
 
 import icha
+from icha.datasets.quantities import label_of
 
 mpl.use("agg")
 RUN = small.run(1)
@@ -19,10 +20,10 @@ def test_area_and_separation_are_drawn_in_units_with_prefixes():
     (line,) = axes.get_lines()
     np.testing.assert_allclose(line.get_ydata(), RUN.contact_area_fraction)
     np.testing.assert_allclose(line.get_xdata() * 1e3, RUN.nominal_pressure)
-    assert axes.get_xlabel() == "pressure  (kPa)" and line.get_label() == "soft"
+    assert axes.get_xlabel() == "nominal pressure  $p$ (kPa)" and line.get_label() == "soft"
     assert icha.plot_area(RUN, axes) is axes and len(axes.get_lines()) == 2
     axes = icha.plot_separation(RUN)
-    assert axes.get_ylabel() == "mean gap  (µm)"
+    assert axes.get_ylabel() == label_of("mean_gap", "µm")
     np.testing.assert_allclose(axes.get_lines()[0].get_ydata() * 1e-6, RUN.mean_gap)
 
 

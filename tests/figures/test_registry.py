@@ -5,7 +5,7 @@ import sys
 
 from icha.configuration.figures import Figures
 from icha.datasets.results import figure_number
-from icha.figures.registry import figure_module
+from icha.figures.registry import drawing_function
 
 # Plans the campaign `smoke` as `icha describe` does.
 LIGHT = """
@@ -33,4 +33,4 @@ def test_figures_are_in_the_order_of_their_numbers_and_can_be_drawn():
     numbers = [figure_number(name) for name in names]
     assert numbers == sorted(set(numbers)) and len(numbers) == 21
     for name in names:
-        assert callable(figure_module(name).figure)
+        assert callable(drawing_function(name))

@@ -8,14 +8,7 @@ from drawn import legend, lines_of
 
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import RunLabels
-from icha.figures import (
-    fig2_area_and_gap,
-    fig4_contact_map,
-    fig5_multi_slope,
-    fig6_spots_by_slope,
-    fig13_loops,
-    fig15_loss,
-)
+from icha.figures import against_load, against_parameter, contact_maps, loops
 from icha.figures.captions import count_runs
 from icha.figures.drawn import Name
 from icha.figures.ensembles import draw_members, draw_points
@@ -24,7 +17,7 @@ from icha.figures.style import new_figure
 
 SEEDS = range(1, 6)
 REASON = "asperity model not applicable: 40 % of the load is on summits that no node supports"
-LOADING = (fig2_area_and_gap, fig5_multi_slope)
+LOADING = (against_load.area_and_gap, against_load.multi_slope)
 
 
 def campaign(failed=None, checks=None, pale=(), lacking=(), run=small.run):
@@ -48,16 +41,16 @@ def campaign(failed=None, checks=None, pale=(), lacking=(), run=small.run):
 
 
 def draw(module, tree):
-    return module.figure(tree, **{"studies": ["five"]} if module is fig15_loss else {"study": "five"})
+    return module(tree, **{"studies": ["five"]} if module is against_parameter.loss else {"study": "five"})
 
 
 def crossed(axes):
     return [line for line in axes.get_lines() if line.get_label() == FEWER_SEEDS]
 
 
-@pytest.mark.parametrize("module", [*LOADING, fig15_loss])
+@pytest.mark.parametrize("module", [*LOADING, against_parameter.loss])
 def test_means_over_fewer_seeds_are_crossed_and_runs_not_applicable_are_pale(module):
-    run = cyclic.run if module is fig15_loss else small.run
+    run = cyclic.run if module is against_parameter.loss else small.run
     figure = draw(module, campaign(lacking=(2,), checks=(4,), pale=(5,), run=run))
     axes = figure.axes[0]
     assert crossed(axes) and not crossed(draw(module, campaign(run=run)).axes[0])
@@ -65,13 +58,13 @@ def test_means_over_fewer_seeds_are_crossed_and_runs_not_applicable_are_pale(mod
         marked = [line for line in lines_of(axes) if line.get_marker() != "x"]
         assert any(np.isin(cross.get_xdata(), line.get_xdata()).all() for line in marked)
     assert legend(figure).count(FEWER_SEEDS) == legend(figure).count(NOT_APPLICABLE) == 1
-    if module is fig15_loss:
-        assert NOT_APPLICABLE in legend(draw(fig13_loops, campaign(pale=(1,), run=run)))
+    if module is against_parameter.loss:
+        assert NOT_APPLICABLE in legend(draw(loops.loops, campaign(pale=(1,), run=run)))
 
 
 def test_runs_that_failed_at_different_steps_are_in_no_mean():
     tree = campaign(failed={2: 2, 4: 3})
-    (cross,) = crossed(fig2_area_and_gap.figure(tree, study="five").axes[0])
+    (cross,) = crossed(against_load.area_and_gap(tree, study="five").axes[0])
     own = [
         small.run(k)["contact_area_fraction"].sel(step=small.run(k)["step_kind"] == "reduced_pressure")
         for k in (1, 3, 5)
@@ -100,9 +93,9 @@ def test_no_line_joins_means_over_different_seeds(few):
 
 def test_figures_of_one_run_say_that_the_model_is_not_applicable(surface):
     tree = campaign(pale=(1,))
-    figure = fig4_contact_map.figure(tree, surface, run=("five", "asperities", "rough", 1, 1.0, "soft"))
+    figure = contact_maps.contact_map(tree, surface, run=("five", "asperities", "rough", 1, 1.0, "soft"))
     assert NOT_APPLICABLE_ALONE in figure.get_suptitle()
-    assert NOT_APPLICABLE_ALONE in legend(fig6_spots_by_slope.figure(tree, study="five"))[0]
+    assert NOT_APPLICABLE_ALONE in legend(contact_maps.spots_by_slope(tree, study="five"))[0]
 
 
 def test_captions_count_what_is_missing():
@@ -118,7 +111,7 @@ def test_captions_name_a_material_whose_runs_ended_before_their_first_target():
     reason = "the path ends near full contact"
     ended = [(labels, own.isel(step=slice(0, 0)).assign_attrs(beyond_model=reason)) for labels, own in small.runs()[:1]]
     tree = campaign_tree([*ended, *small.runs()[1:2]])
-    assert "soft" not in legend(fig2_area_and_gap.figure(tree, study="slopes"))
+    assert "soft" not in legend(against_load.area_and_gap(tree, study="slopes"))
     caption = count_runs({"campaign": tree}, ["slopes"])
     assert "The figure shows 1 of 2 runs; 1 ended before the first target" in caption
     assert f"Without a curve: soft with asperities (1 ended before the first target: {reason})." in caption

@@ -11,7 +11,7 @@ from xarray import DataTree
 from icha.datasets.campaign import find_snapshot
 from icha.datasets.files import write_dataset
 from icha.datasets.table import as_csv
-from icha.figures import fig2_area_and_gap, fig6_spots_by_slope, fig8_patch_sizes, fig10_model_error
+from icha.figures import against_load, at_one_load, contact_maps, errors
 from icha.figures.drawn import table_of
 from icha.figures.registry import draw_figure
 from icha.figures.select import path_steps
@@ -22,7 +22,7 @@ def table(figure):
 
 
 def test_means_over_seeds_with_their_range():
-    data = table(fig2_area_and_gap.figure(small.tree(), study="single"))
+    data = table(against_load.area_and_gap(small.tree(), study="single"))
     ratios = data[data.panel == "a"]
     assert set(ratios.curve) == {"asperities"} and set(ratios.material) == {"soft"} and "seed" not in data
     stops = [path_steps(small.run(seed)) for seed in (1, 2)]
@@ -35,7 +35,7 @@ def test_means_over_seeds_with_their_range():
 
 
 def test_single_runs_have_their_seed_and_slope():
-    data = table(fig2_area_and_gap.figure(small.tree(), study="slopes"))
+    data = table(against_load.area_and_gap(small.tree(), study="slopes"))
     run = path_steps(small.run(rms_slope=0.2, material="hertz"))
     shown = data[(data.panel == "b") & (data.rms_slope == 0.2) & (data.material == "hertz")]
     np.testing.assert_allclose(shown.y, run["reduced_separation"].values, rtol=1e-9)
@@ -44,7 +44,7 @@ def test_single_runs_have_their_seed_and_slope():
 
 def test_points_that_are_drawn_apart_have_their_load():
     error = compared.errors()
-    data = table(fig10_model_error.figure(compared.tree(), error, study="one"))
+    data = table(errors.model_error(compared.tree(), error, study="one"))
     loads = error["one"]["reduced_pressure"].values
     assert np.isclose(data.x.values[:, None], loads, rtol=1e-12).any(axis=1).all()
     areas = data[data.panel == "a"]
@@ -53,7 +53,7 @@ def test_points_that_are_drawn_apart_have_their_load():
 
 
 def test_boundary_elements_are_named_as_such():
-    data = table(fig8_patch_sizes.figure(compared.tree_of_both(), study="one"))
+    data = table(at_one_load.patch_sizes(compared.tree_of_both(), study="one"))
     assert set(zip(data.curve, data.model, strict=True)) == {
         ("asperities", "asperities"),
         ("boundary elements", "boundary_elements"),
@@ -63,7 +63,7 @@ def test_boundary_elements_are_named_as_such():
 def test_spots_are_listed_once():
     run = small.run(rms_slope=0.2)
     count = int((run["spot_snapshot"] == find_snapshot(run, "relative_load")).sum())
-    data = table(fig6_spots_by_slope.figure(small.tree(), study="slopes", material="soft"))
+    data = table(contact_maps.spots_by_slope(small.tree(), study="slopes", material="soft"))
     shown = data[(data.panel == "a") & (data.rms_slope == 0.2)]
     assert len(shown) == count and shown.radius.gt(0).all() and shown.x_quantity.str.fullmatch("x .µm.").all()
 

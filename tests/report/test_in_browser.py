@@ -14,7 +14,7 @@ from PIL import Image
 from icha.analysis.checks import check_campaign
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.surface_file import write_surface
-from icha.figures import fig2_area_and_gap
+from icha.figures import against_load
 from icha.figures.style import save
 from icha.report.explorer import write_explorer
 from icha.report.report import write_report
@@ -39,7 +39,7 @@ def report_file(tmp_path_factory):
     tree = campaign_tree(runs, attrs={"title": "Small campaign", "license": "CC0-1.0"})
     write_surface(folder / "s.nc", small.surface(), name="rough", seed=1, spectrum=small.SPECTRUM)
     files = [folder / f"figures/fig2_area_and_gap.{ending}" for ending in ("png", "pdf", "txt")]
-    save(fig2_area_and_gap.figure(tree, study="slopes"), *files[:2])
+    save(against_load.area_and_gap(tree, study="slopes"), *files[:2])
     files[2].write_text("Caption.\n")
     write_report(
         folder / "report.html",

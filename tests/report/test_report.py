@@ -16,7 +16,7 @@ from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import read_dataset
 from icha.datasets.labels import RunLabels
 from icha.datasets.surface_file import write_surface
-from icha.figures import fig1_jkr
+from icha.figures import one_asperity
 from icha.figures.style import save
 from icha.report import report
 from icha.report.report import write_report
@@ -55,7 +55,7 @@ def rows(text, caption):
 def parts(tmp_path_factory):
     """A folder with a figure and a surface, and the checks of the small campaign."""
     folder = tmp_path_factory.mktemp("parts")
-    save(fig1_jkr.figure(), *(folder / f"figures/fig1_jkr.{ending}" for ending in ("png", "pdf")))
+    save(one_asperity.jkr(), *(folder / f"figures/fig1_jkr.{ending}" for ending in ("png", "pdf")))
     (folder / "figures/fig1_jkr.txt").write_text("Caption <i>with</i> E*.\n")
     (folder / "figures/fig1_jkr.csv").write_text("x,y\n")
     write_surface(folder / "s.nc", small.surface(), name="rough", seed=1, spectrum=small.SPECTRUM)

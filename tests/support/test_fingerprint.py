@@ -59,7 +59,7 @@ def test_scripts_count_with_the_modules_that_they_import(tmp_path):
     assert len(set(prints.values())) == len(prints)
     assert "icha.figures.style" in {*imported_modules("icha.figures.registry")}
     draws = REPOSITORY / "workflow/scripts/draw_figures.py"
-    assert fingerprint("icha.figures.fig1_jkr", script=draws) != fingerprint("icha.figures.fig13_loops", script=draws)
+    assert fingerprint("icha.figures.one_asperity", script=draws) != fingerprint("icha.figures.loops", script=draws)
 
 
 def test_imports_that_cannot_be_followed_are_refused(tmp_path):

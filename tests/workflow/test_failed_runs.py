@@ -15,7 +15,7 @@ from icha.datasets.format import RUN, problems_with_file
 from icha.datasets.labels import RunLabels
 from icha.datasets.results import FIGURE_ENDINGS
 from icha.datasets.surface_file import write_surface
-from icha.figures.fig2_area_and_gap import figure
+from icha.figures.against_load import area_and_gap as figure
 from icha.figures.registry import draw_figure
 from icha.figures.select import NothingToDraw
 from icha.surfaces.surface import Surface

@@ -1,4 +1,4 @@
-"""Fig. 1: force and contact radius of one asperity against approach."""
+"""Figure of one asperity: force and contact radius against approach (1)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ B is the pull-off point under load control. The dotted line is the unstable bran
 
 
 @in_style
-def figure(*, tabor_parameter: float = 3.0) -> Figure:
+def jkr(*, tabor_parameter: float = 3.0) -> Figure:
     """Draw the JKR law in reduced units: a in (Δγ R²/E*)^(1/3), δ in (Δγ² R/E*²)^(1/3) and F in Δγ R."""
     from icha.asperity.jkr import JKR
     from icha.asperity.material import Material

@@ -1,0 +1,494 @@
+"""Figures of all runs of a study against load: area and separation (2), area and measurements (5), stiffness (7)."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from icha.datasets.labels import RunLabels
+from icha.datasets.quantities import label_of, quantity
+from icha.figures import curves
+from icha.figures.captions import theories_of_flat_surfaces
+from icha.figures.curves import Panel, draw_theory
+from icha.figures.drawn import Name, plot, record, say
+from icha.figures.ensembles import draw_members
+from icha.figures.looks import ASPERITIES_NAME, MODEL_MARKERS, REFERENCE_NAME, TRUTH_LINE, model_handle, surface_label
+from icha.figures.select import NothingToDraw, has_shape
+from icha.figures.style import BLACK, DASHES, GREY, in_style, logarithmic_axes, new_panels
+from icha.support.formatting import choose_unit
+from icha.support.tables import read_columns
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+
+_BLACK = {"color": BLACK, "lw": 1, "zorder": 2}
+
+# --- figure 2 ---
+
+# Height of the lower panels divided by the height of the upper panels. The lower panels show differences.
+_LOWER = 0.42
+# Loads of two models count as equal up to this relative difference, because each model has its own load tolerance.
+_SAME_LOAD = 1e-6
+# Ticks of the separation axis, if the ratio of the ends of this axis is less than 60.
+_SEPARATIONS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5)
+# Look of Ciavarella's estimate from boundary elements without adhesion.
+_ESTIMATE = {"ls": (0, (6, 1.5, 1, 1.5, 1, 1.5)), "lw": 0.9, "zorder": 1.9}
+# What is compared in each lower panel, and the difference that is drawn.
+_COMPARED_IN = (
+    (Panel("reduced_pressure", "contact_area_fraction"), "area_error"),
+    (Panel("reduced_pressure", "reduced_separation"), "separation_error"),
+)
+
+_COMPARED = """Panels (c) and (d) show the relative difference between asperity model and boundary elements (BEM), on
+the same topographies at the same loads; thin lines join the symbols, which end at the largest load that both models
+reach."""
+_CIAVARELLA = """Lines with two dots show the estimate of Ciavarella (2018) in place of the asperity model; it follows
+from boundary elements without adhesion, and its loads are not those of the symbols."""
+_PERSSON = "Other lines are theories of contact without adhesion: that of Persson for the area (a)."
+_BUSH = "That of Bush, Gibson and Thomas, also for the area, is grey and dashed."
+_YANG = "That of Yang and Persson for the separation is in (b)."
+_XU = "Xu et al. (2024) correct Persson's theory for the variance of the pressure in partial contact."
+_SUMMITS = {
+    "Greenwood & Williamson": "The theory of Greenwood and Williamson, in (a) and (b), describes separate summits.",
+    "Fuller & Tabor": """Of these theories, only that of Fuller and Tabor, also in (a) and (b) and of separate summits,
+    includes adhesion.""",
+}
+_GFMD = """Oblique crosses are published results of Green's function molecular dynamics without adhesion for this
+spectrum (Xu et al., 2024), with standard deviations over surfaces. These areas are counts of cells on a coarse grid; a
+correction for the perimeter would make them up to 7 % smaller."""
+
+
+@in_style
+def area_and_gap(
+    campaign: xr.DataTree, references: xr.Dataset | None = None, *, study: str, units: str = "reduced"
+) -> Figure:
+    """Draw area over load and mean gap of all runs of a study, or in physical units the area and the mean gap.
+
+    Parameters
+    ----------
+    campaign : the campaign dataset.
+    references : theories and published results for the study's first surface (`icha.references.theories`), if flat.
+    units : "reduced" or "physical". In physical units, theories are drawn only if one pressure unit holds for all runs.
+    """
+    shown, dataset = curves.study_curves(campaign, study), campaign[study].to_dataset()
+    physical, gap_words = units == "physical", label_of(curves.gap_name(dataset)).partition("  ")[0]
+    panels = _physical_panels(dataset) if physical else _reduced_panels(dataset)
+    truths = {} if physical else {truth.runs.contact: truth for truth in shown.crosses}
+    compared = [(line, truths[line.runs.contact]) for line in shown.lines if line.runs.contact in truths]
+    fig, axes = new_panels(4.5, 2, sharex=True, height_ratios=(1, _LOWER)) if compared else new_panels(3.3)
+    left, right = axes[0]
+    say(
+        fig,
+        "Contact area divided by nominal area (a), and mean gap (b), against the nominal pressure."
+        if physical
+        else f"""Ratio of contact area and load (a), A/A0 divided by the reduced pressure F/(E* h'rms A0), and
+        {gap_words} divided by rms height (b), against the reduced pressure.""",
+    )
+    _say_symbols(fig, shown, dataset)
+    (loads, areas), (_, gaps) = (
+        map(curves.drop_rounding_errors, drawn)
+        for drawn in curves.draw_curves(shown, dict(zip(axes[0], panels, strict=True)), unloading=True)
+    )
+    x = (loads.min() / 1.6, loads.max() * 1.6)
+    if references is not None and not physical:
+        _draw_references(axes[0], panels, references, x)
+        if dataset.sizes["surface"] > 1:
+            say(fig, "Theories are those of the first surface.")
+        _draw_separate_summits(axes[0], panels, references, study, dataset, shown.looks)
+    elif references is not None and (unit := _only_unit(shown)):
+        say(fig, _PERSSON)
+        _draw_persson(axes[0], panels, references, x, unit)
+    for ax, panel in zip(axes[0], panels, strict=True):
+        panel.label(ax)
+    if not physical:
+        curves.limit_ratios(left, areas)
+        low, high = gaps.min() / 1.4, gaps.max() * 1.4
+        right.set_ylim(low, high)
+        right.yaxis.set_major_formatter("{x:g}")
+        right.yaxis.set_minor_formatter("")
+        if high < 60 * low:
+            right.set_yticks([tick for tick in _SEPARATIONS if low < tick < high])
+    if compared:
+        say(fig, _COMPARED)
+        _draw_differences(axes[1], shown, compared)
+        for ax in axes[0]:
+            ax.set_xlabel("")
+    say(fig, "" if physical else theories_of_flat_surfaces(dataset))
+    for ax in axes[-1]:
+        ax.set(xlim=x, xlabel=label_of(panels[0].x, panels[0].units[0]))
+    curves.add_legend(fig, shown)
+    return fig
+
+
+def _reduced_panels(dataset):
+    return Panel("reduced_pressure", "area_over_load"), Panel("reduced_pressure", curves.gap_name(dataset))
+
+
+def _physical_panels(dataset):
+    """Return panels of area and mean gap against nominal pressure, in units with prefixes for a study."""
+    (per_pascal, pressure), (per_metre, length) = (
+        choose_unit(float(np.abs(dataset[name]).max()), unit)
+        for name, unit in (("nominal_pressure", "Pa"), ("mean_gap", "m"))
+    )
+    area = Panel("nominal_pressure", "contact_area_fraction", (per_pascal, 1.0), (pressure, ""))
+    return area, Panel("nominal_pressure", "mean_gap", (per_pascal, per_metre), (pressure, length))
+
+
+def _only_unit(shown):
+    """Return the unit of reduced pressures, Pa, and the unit of reduced separations, m; None if runs differ."""
+    runs = [run for line in shown.lines for run in line.runs.by_seed.values()]
+    units = [(float(run["contact_modulus"] * run["unit_slope"]), float(run["unit_height"])) for run in runs]
+    return units[0] if len({float(f"{pressure:.6g}") for pressure, _ in units}) == 1 else None
+
+
+def _say_symbols(fig, shown, dataset):
+    """Explain symbols and their filling in the caption."""
+    curves.say_models(fig, shown, " in loading")
+    energies = {curve.runs.surface_energy > 0 for curve in (*shown.lines, *shown.crosses)}
+    if False in energies and any(curve.runs.model_name == ASPERITIES_NAME for curve in shown.lines):
+        say(fig, "Open shapes are without adhesion.")
+    if len(energies) > 1 and shown.crosses:
+        say(
+            fig,
+            """Crosses without adhesion are larger. Where adhesion has little effect, closed shapes and small crosses
+            lie inside open shapes and large crosses.""",
+        )
+    if dataset.sizes["seed"] == 1:
+        say(fig, "Results are of one realisation of the surface.")
+
+
+def _states(pressure, area, separation=None, unit=(1.0, 1.0)):
+    """Return the states of a theory as variables of a run; `unit` has the units of pressure and separation."""
+    found = {"reduced_pressure": pressure, "nominal_pressure": pressure * unit[0], "contact_area_fraction": area}
+    if separation is not None:
+        found |= {"reduced_separation": separation, "mean_gap": separation * unit[1]}
+    return {name: np.asarray(values, float) for name, values in found.items()}
+
+
+def _draw_persson(axes, panels, references, limits, unit=(1.0, 1.0)):
+    """Draw the theories of Persson for the area, and of Yang and Persson for the separation."""
+    separation = references.get("persson_reduced_separation")
+    states = _states(references["reduced_pressure"], references["persson_area_fraction"], separation, unit)
+    draw_theory(axes[0], panels[0], states, limits, label="Persson", **_BLACK)
+    if separation is not None:
+        say(axes[0], _YANG)
+        look = _BLACK | {"ls": (0, (7, 2))}
+        draw_theory(axes[1], panels[1], states, limits, label="Yang & Persson", **look)
+
+
+def _draw_references(axes, panels, references, limits):
+    """Draw published results and theories of rough contact; `limits` are the smallest and the largest load."""
+    (left, _), (area, _) = axes, panels
+    say(left, _PERSSON, _BUSH, _XU)
+    _draw_persson(axes, panels, references, limits)
+    for label, load, name, look in (
+        ("Persson, corrected by Xu et al.", "reduced_pressure", "xu_area_fraction", {"ls": (0, (1, 1))}),
+        ("Bush, Gibson & Thomas", "linear_pressure", "bush_gibson_thomas_area_fraction", {"ls": "--", "color": GREY}),
+    ):
+        draw_theory(left, area, _states(references[load], references[name]), limits, label=label, **_BLACK | look)
+    if "gfmd_reduced_pressure" in references:
+        load, fraction, scatter = (
+            references[f"gfmd_{name}"].values for name in ("reduced_pressure", "area_fraction", "area_scatter")
+        )
+        points = {"fmt": "x", "color": BLACK, "ms": 6, "mew": 1.2, "lw": 1.2, "zorder": 5}
+        say(left, _GFMD)
+        record(left, load, fraction / load, "GFMD", low=(fraction - scatter) / load, high=(fraction + scatter) / load)
+        left.errorbar(load, fraction / load, scatter / load, label="GFMD, no adhesion", **points)
+
+
+def _draw_separate_summits(axes, panels, references, study, dataset, looks):
+    """Draw theories of separate summits: Greenwood & Williamson, and Fuller & Tabor for each material and slope."""
+    theories = []
+    if "greenwood_williamson_reduced_pressure" in references:
+        name, look = Name("Greenwood & Williamson"), {"ls": (0, (5, 2, 1, 2)), "color": GREY}
+        theories.append((name, look, "greenwood_williamson", references))
+    for k in range(references.sizes.get("fuller_tabor_curve", 0)):
+        theory = references.isel(fuller_tabor_curve=k)
+        material, slope = str(theory["fuller_tabor_material"].values), float(theory["fuller_tabor_rms_slope"])
+        if material in looks.materials and np.isclose(slope, dataset["rms_slope"].values, rtol=1e-9).any():
+            surface = str(dataset["surface"].values[0])
+            name = Name("Fuller & Tabor", RunLabels(study, None, surface, None, slope, material))
+            look = {"ls": (0, (1, 1.5)), "color": looks.material_colour(material)}
+            theories.append((name, look, "fuller_tabor", theory))
+    for name, look, prefix, theory in theories:
+        say(axes[0], _SUMMITS[name.curve])
+        pressure, separation = (theory[f"{prefix}_reduced_{each}"] for each in ("pressure", "separation"))
+        states = _states(pressure.where(pressure > 0), theory["summit_area_fraction"], separation)
+        look |= {"lw": 0.8, "zorder": 1.8}
+        for ax, panel in zip(axes, panels, strict=True):
+            draw_theory(ax, panel, states, (0.0, np.inf), name, **look)
+        axes[0].plot([], [], label=name.curve, **look | ({} if len(theories) <= 2 else {"color": GREY}))
+
+
+def _draw_differences(axes, shown, compared):
+    """Draw the differences between asperities and boundary elements, and those of Ciavarella's estimate."""
+    for ax, (panel, error) in zip(axes, _COMPARED_IN, strict=True):
+        for line, truth in compared:
+            load, members = _difference(line, truth, panel)
+            if members.size:
+                name = line.runs.drawn_name._replace(curve="asperities relative to boundary elements")
+                of_curve = {"name": name, "asked": min(line.runs.asked, truth.runs.asked), "curves": len(compared)}
+                draw_members(ax, load, members, line.look | {"lw": 0.6}, positive=False, **of_curve)
+        logarithmic_axes(ax, "x")
+        ax.axhline(0, color="0.6", lw=0.6, zorder=0)
+        ax.set_ylabel(rf"${quantity(error).symbol}$  (%)")
+    _draw_estimates(axes, shown, compared)
+
+
+def _difference(line, truth, panel):
+    """Return loads, and for each seed the differences in per cent between a curve and boundary elements.
+
+    Loads are those of the curve in the load range of boundary elements, and the largest load that both reach. Values of
+    both models are interpolated to these loads.
+    """
+    from icha.analysis.common_loads import at_common_loads, interpolate
+
+    members, runs, truths = [], line.stops, truth.stops
+    for seed in [seed for seed in runs if seed in truths]:
+        (load, values), (true_load, true_values) = _pressed(panel, runs[seed]), _pressed(panel, truths[seed])
+        if load.size and true_load.size:
+            at = np.clip(load, true_load.min(), true_load.max())
+            at = at[np.isclose(at, load, rtol=_SAME_LOAD, atol=0)]
+            largest = min(load.max(), true_load.max())
+            if at.size and not np.isclose(at.max(), largest, rtol=_SAME_LOAD, atol=0):
+                at = np.append(at, largest)
+            logarithmic = panel.y == "contact_area_fraction"
+            own, true = (
+                interpolate(*each, at, logarithmic=logarithmic) for each in ((load, values), (true_load, true_values))
+            )
+            members.append((at, 100 * (own / true - 1)))
+    return at_common_loads(members, logarithmic=False) if members else (np.empty(0), np.empty((0, 0)))
+
+
+def _pressed(panel, run):
+    """Return the points of a run at compressive loads; with adhesion, areas may be reached in tension."""
+    load, values = panel.points(run)
+    return load[load > 0], values[load > 0]
+
+
+def _draw_estimates(axes, shown, compared):
+    """Draw the difference between Ciavarella's estimate from boundary elements without adhesion, and those with it."""
+    from icha.analysis import common_loads
+
+    bare = {truth.runs.contact[1:]: truth.runs.by_seed for _, truth in compared if not truth.runs.surface_energy}
+    single = sum(truth.runs.surface_energy > 0 for _, truth in compared) == 1
+    for line, truth in compared:
+        seed = next(iter(truth.stops))
+        without = bare.get(line.runs.contact[1:], {}).get(seed)
+        if without is None or not truth.runs.surface_energy:
+            continue
+        if (states := _estimate(without, truth.runs.by_seed[seed])) is None:
+            continue
+        colour = shown.looks.material_colour(line.runs.labels.material)
+        for ax, (panel, _) in zip(axes, _COMPARED_IN, strict=True):
+            (load, true), (at, values) = _pressed(panel, truth.stops[seed]), panel.points(states)
+            if not load.size:
+                continue
+            inside = (at >= load.min()) & (at <= load.max())
+            known = common_loads.interpolate(load, true, at[inside], logarithmic=panel.y == "contact_area_fraction")
+            say(ax, _CIAVARELLA)
+            name = truth.runs.drawn_name._replace(curve="Ciavarella")
+            plot(ax, at[inside], 100 * (values[inside] / known - 1), name, color=colour, **_ESTIMATE)
+            named = colour if single else GREY
+            ax.plot([], [], color=named, label="Ciavarella, from runs without adhesion", **_ESTIMATE)
+
+
+def _estimate(bare, adhesive):
+    """Return the states of Ciavarella's estimate; None for few states."""
+    from icha.datasets.campaign import reduced_gap, unit_height
+    from icha.references.bare_runs import ciavarella_states
+
+    loading, height = bare["leg"].values == 0, float(unit_height(bare))
+    loads = (bare["nominal_pressure"] / bare["contact_modulus"]).values[loading]
+    areas, gaps = bare["contact_area_fraction"].values[loading], reduced_gap(bare).values[loading]
+    length = float(adhesive["surface_energy"] / adhesive["contact_modulus"])
+    states = ciavarella_states(loads, areas, gaps * height, length)
+    slope = float(bare["unit_slope"])
+    return states and _states(states.relative_load / slope, states.area_fraction, states.separation / height)
+
+
+# --- figure 5 ---
+
+# Largest number of surfaces that have their own columns of panels.
+_MOST_SURFACES = 3
+_AREA = Panel("relative_load", "contact_area_fraction")
+_RATIO, _RATIO_OF_SHAPE = Panel("reduced_pressure", "area_over_load"), Panel("relative_load", "area_over_relative_load")
+_WORDS = {
+    _AREA: "Contact area divided by nominal area, A/A0, against the relative load F/(E* A0)",
+    _RATIO: """Ratio of contact area and load, A/A0 divided by the reduced pressure F/(E* h'rms A0), against this
+    pressure""",
+    _RATIO_OF_SHAPE: "Ratio of contact area and load, A/A0 divided by the relative load F/(E* A0), against this load",
+}
+_SHAPED = "Relative loads take the place of reduced pressures, because a surface has a shape."
+
+
+@in_style
+def multi_slope(
+    campaign: xr.DataTree,
+    tables: Sequence[str | os.PathLike] = (),
+    *,
+    study: str,
+    boundary_elements: str | None = None,
+    measurements: Sequence[Mapping[str, Any]] = (),
+) -> Figure:
+    """Draw all runs of a study: area, and area over load; with several slopes of several surfaces, only the latter.
+
+    Area over load is drawn against the reduced pressure. If a surface has a shape, it is drawn against the relative
+    load, because the unit of reduced pressures of a shape is not the rms slope, which a measurement has.
+
+    Parameters
+    ----------
+    campaign : the campaign dataset.
+    tables : files of measured curves; axes of relative loads show only curves whose relative loads are known.
+    measurements : for each table, the values of `label`, `citation`, `columns` (headings and factors), `material`,
+        `rms_slope` and `contact_modulus`. The last is E*, Pa, if the loads are pressures in Pa; it is None if they are
+        reduced pressures p/(E* h'rms). Unknown values are None.
+    """
+    shown = curves.study_curves(campaign, study, boundary_elements)
+    looks = shown.looks
+    # If colours distinguish surfaces and slopes, every material has a row of panels; a few surfaces have columns.
+    own_rows = looks.by_place and len(looks.materials) > 1
+    if own_rows and shown.crosses:
+        shown = _with_one_shape_per_model(shown)
+    elif not own_rows:
+        # Open markers do not hide each other where curves coincide.
+        shown = curves.study_curves(campaign, study, boundary_elements, mfc="none")
+    rows = [[material] for material in looks.materials] if own_rows else [looks.materials]
+    shaped = has_shape(campaign[study].to_dataset())
+    ratio = _RATIO_OF_SHAPE if shaped else _RATIO
+    columns = [(_AREA, None), (ratio, None)]
+    surfaces = list(dict.fromkeys(surface for surface, _ in looks.places))
+    if looks.slopes_per_surface and len(surfaces) <= _MOST_SURFACES:
+        columns = [(ratio, surface) for surface in surfaces]
+    fig, panels = new_panels(0.5 + 2.8 * len(rows), len(rows), len(columns), sharex="col")
+    both = (_AREA, None) in columns
+    say(fig, f"{_WORDS[_AREA]} (left)." if both else "", _WORDS[ratio] + (" (right)." if both else "."))
+    say(fig, _SHAPED if shaped else "")
+    curves.say_models(fig, shown)
+    for row, materials in zip(panels, rows, strict=True):
+        ratios = []
+        for ax, (panel, surface) in zip(row, columns, strict=True):
+            of_panel = shown._replace(
+                lines=_select(shown.lines, materials, surface), crosses=_select(shown.crosses, materials, surface)
+            )
+            [(_, values)] = curves.draw_curves(of_panel, {ax: panel}, unloading=True, count=len(shown.lines))
+            for k, (table, known) in enumerate(zip(tables, measurements, strict=True)):
+                if known["material"] in (None, *materials):
+                    look = {"color": looks.material_colour(known["material"]), "ls": DASHES[k % len(DASHES)]}
+                    values = np.append(values, _draw_measured(ax, panel, table, known, look))
+            words = [surface_label(campaign, surface)] if surface else []
+            words += [looks.material_name(materials[0])] if own_rows else []
+            ax.set_title(", ".join(words), loc="right", fontsize=8)
+            panel.label(ax)
+            if ax not in panels[-1]:
+                ax.set_xlabel("")
+            ratios += [values] if panel is ratio else []
+        for ax in row[[panel is ratio for panel, _ in columns]]:
+            curves.limit_ratios(ax, np.concatenate(ratios))
+    curves.add_legend(fig, shown)
+    _say_slopes(fig, shown, own_rows=own_rows, shaped=shaped)
+    if measurements:
+        named = "; ".join(f"{each['label']} ({each['citation']})" for each in measurements)
+        say(fig, f"Lines without markers are measurements: {named}.")
+    return fig
+
+
+def _say_slopes(fig, shown, *, own_rows, shaped):
+    """Explain how curves of different slopes differ; slopes of shapes are not those of one scaled topography."""
+    adhesive = {each.runs.surface_energy > 0 for each in shown.lines}
+    if len({slope for _, slope in shown.looks.places}) > 1 and not shaped:
+        if False in adhesive:
+            say(
+                fig,
+                """Without adhesion, the ratios of one topography at different slopes coincide, so that they hide each
+                other.""",
+            )
+        if True in adhesive:
+            say(fig, "Adhesion increases the contact area, most for the smallest slopes.")
+    if own_rows:
+        open_circles = "Open circles are without adhesion. " if False in adhesive else ""
+        say(fig, f"{open_circles}Rows of panels have different scales.")
+
+
+def _with_one_shape_per_model(shown):
+    """Return curves whose boundary elements all are upright crosses with a dashed line; the legend names the models."""
+    shape = {"marker": MODEL_MARKERS[REFERENCE_NAME], "ls": TRUTH_LINE["ls"], "lw": 0.6}
+    handles = {ASPERITIES_NAME: model_handle(ASPERITIES_NAME, **{"ls": "-", "lw": 0.9} | shown.looks.fill())}
+    handles = shown.looks.colour_handles() | handles | {REFERENCE_NAME: model_handle(REFERENCE_NAME, **shape)}
+    return shown._replace(crosses=[each._replace(look=each.look | shape) for each in shown.crosses], handles=handles)
+
+
+def _select(lines, materials, surface):
+    """Return the curves of some materials, and of one surface or, if it is None, of all surfaces."""
+    contacts = [(line, *line.runs.contact) for line in lines]
+    return [line for line, material, place, _ in contacts if material in materials and surface in (None, place)]
+
+
+def _draw_measured(ax, panel, table, known, look):
+    """Draw a measured curve, if its loads are known in the unit of the axis, and return the values that are drawn."""
+    load, area = read_columns(table, known["columns"])
+    slope, modulus = known["rms_slope"], known["contact_modulus"]
+    states = {"contact_area_fraction": area}
+    if modulus:  # loads are pressures
+        states |= {"relative_load": load / modulus} | ({"reduced_pressure": load / modulus / slope} if slope else {})
+    else:
+        states |= {"reduced_pressure": load} | ({"relative_load": load * slope} if slope else {})
+    if panel.x not in states:
+        return np.empty(0)
+    x, y = panel.points(states)
+    plot(ax, x, y, **look | {"lw": 1.1, "zorder": 1, "label": known["label"]})
+    return y
+
+
+# --- figure 7 ---
+
+STIFFNESS = Panel("reduced_pressure", "reduced_stiffness")
+_STIFFNESS = """Contact stiffness K = -dp/du against the reduced pressure F/(E* h'rms A0), with the nominal pressure p
+and the mean separation u, in units of E* h'rms/h_rms (a) and of p/h_rms (b). In panel (b), a stiffness proportional to
+the pressure is a horizontal line."""
+_EDGES = """Boundary elements include the motion of the edges of contact. With adhesion they vary as the edges move
+across cells, for a single sphere by 7 to 60 %."""
+_INFINITE = """The black line is the theory of Yang and Persson for an infinite surface without adhesion, where the
+stiffness at small loads is proportional to the load. On a finite surface it is larger, because only the highest parts
+touch (Pastewka et al., Phys. Rev. E 87 (2013) 062809)."""
+
+
+@in_style
+def stiffness(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study: str) -> Figure:
+    """Draw all runs of a study, and the theory for the study's first surface (`icha.references.theories`), if any."""
+    shown = curves.study_curves(campaign, study, panel=STIFFNESS)
+    fig, [axes] = new_panels(3.3)
+    dataset = campaign[study].to_dataset()
+    say(fig, _STIFFNESS)
+    curves.say_models(fig, shown)
+    models = {curve.runs.model_name for curve in (*shown.lines, *shown.crosses)}
+    if ASPERITIES_NAME in models:
+        say(fig, "The asperity model gives the stiffness for spots that do not form, break or unite.")
+        if not all(line.runs.surface_energy for line in shown.lines):
+            say(fig, "Open shapes are results without adhesion.")
+    if models - {ASPERITIES_NAME}:
+        say(fig, _EDGES)
+    panels = dict(zip(axes, (STIFFNESS, Panel("reduced_pressure", "stiffness_over_pressure")), strict=True))
+    (loads, stiffnesses), (_, ratios) = curves.draw_curves(shown, panels)
+    if not len(loads):
+        raise NothingToDraw(f"study {study}: no step of the first loading has a positive load and a positive stiffness")
+    x = (curves.drop_rounding_errors(loads).min() / 1.6, loads.max() * 1.6)
+    for ax, panel in panels.items():
+        panel.label(ax)
+        if references is not None and "persson_reduced_stiffness" in references:
+            say(fig, _INFINITE)
+            theory = {"reduced_pressure": "reduced_pressure", "reduced_stiffness": "persson_reduced_stiffness"}
+            states = {name: references[variable].values for name, variable in theory.items()}
+            drawn = draw_theory(ax, panel, states, x, label="Yang & Persson", ls="-", **_BLACK)
+            ratios = np.append(ratios, drawn) if ax is axes[1] else ratios
+    axes[1].set_yscale("linear")
+    axes[0].set(xlim=x, ylim=(curves.drop_rounding_errors(stiffnesses).min() / 2, stiffnesses.max() * 2))
+    axes[1].set(xlim=x, ylim=(0, 1.15 * ratios.max()))
+    say(fig, "States with negative pressure or negative stiffness are left out.", theories_of_flat_surfaces(dataset))
+    curves.add_legend(fig, shown)
+    return fig

@@ -1,0 +1,540 @@
+"""Figures of results against a parameter: Tabor parameter (9), slope and load (14), area (15), roughness (19)."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from icha.contact.attraction import FINITE_RANGE, SHORT_RANGE
+from icha.contact.models import MODELS, REFERENCE_MODEL
+from icha.datasets.labels import RunLabels
+from icha.datasets.quantities import LOSS_PARTS, label_of
+from icha.figures.captions import (
+    attractions_of,
+    grid_of_loops,
+    only_model,
+    only_spheres,
+    range_of_attraction,
+    without_fit,
+)
+from icha.figures.curves import drop_rounding_errors, gap_name
+from icha.figures.drawn import Name, plot, record, say
+from icha.figures.ensembles import Points
+from icha.figures.indenter_curves import select_series
+from icha.figures.looks import (
+    ASPERITIES_NAME,
+    REFERENCE_NAME,
+    TRUTH_LINE,
+    UNLOADING_MARKERS,
+    Looks,
+    distinct_colours,
+    legend_below,
+    model_handle,
+)
+from icha.figures.select import (
+    ContactRuns,
+    NothingToDraw,
+    group_by_contact,
+    select_detached_lines,
+    select_runs,
+    snapshot_label,
+)
+from icha.figures.style import (
+    COLOURS,
+    GREY,
+    ONE_COLUMN,
+    TWO_COLUMNS,
+    in_style,
+    legend_handle,
+    logarithmic_axes,
+    new_figure,
+    new_panels,
+)
+from icha.support.formatting import choose_unit
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+
+# --- figure 9 ---
+
+# The axis of the Tabor parameter is logarithmic if the ratio of its largest to its smallest value exceeds this number.
+_TABOR_SPAN = 10.0
+_STATE = ("contact_area_fraction", "reduced_separation")
+
+_TABOR = """The Tabor parameter is (R Δγ²/E*²)^(1/3) divided by the range of attraction. R is the radius of a sphere; on
+a rough surface, 1/R is the rms curvature."""
+
+
+@in_style
+def tabor(campaign: xr.DataTree, *, study: str, kind: str | None = None, target: float | None = None) -> Figure:
+    """Draw contact area and mean separation at one snapshot against the Tabor parameter, for all runs of a study.
+
+    For smooth spheres that are pulled off, draw the pull-off force and the loss instead.
+    """
+    from icha.analysis.model_error import state_of
+    from icha.datasets.campaign import find_snapshot
+
+    runs = select_runs(campaign, study, ragged=False)
+    if all(float(run.get("pull_off_force_over_jkr", 0)) and run["short_wavelength"] == np.inf for _, run in runs):
+        return _pull_off_of_spheres([run for _, run in runs])
+    groups = group_by_contact(campaign, runs)
+    run = next(iter(groups[-1].by_seed.values()))
+    shown = snapshot_label(run, find_snapshot(run, kind, target))
+    # Materials that differ only in the range of attraction form one line with the name of the first material.
+    materials: dict[tuple, str] = {}
+    curves: dict[tuple, list[ContactRuns]] = {}
+    bare: dict[tuple, list[ContactRuns]] = {}
+    for group in groups:
+        states = {seed: state_of(run, find_snapshot(run, kind, target)) for seed, run in group.by_seed.items()}
+        group = group._replace(by_seed=states)
+        modulus, energy = (float(next(iter(states.values()))[name]) for name in ("contact_modulus", "surface_energy"))
+        contact = (materials.setdefault((modulus, energy), group.labels.material), *group.contact[1:])
+        if energy > 0:
+            curves.setdefault((contact, group.applicable), []).append(group)
+        elif group.applicable:
+            bare.setdefault(contact, []).append(group)
+    if not curves:
+        raise NothingToDraw(f"study {study}: no run with adhesion is complete; the figure needs a surface energy")
+
+    # The name of a material has no range of attraction, because lines of different ranges are one line.
+    looks = Looks(campaign, [study], [contact for contact, _ in curves], only_drawn=True)
+    fig, [panels] = new_panels(3.1)
+    labels = [label_of(name) for name in ("contact_area_fraction", gap_name(campaign[study].to_dataset()))]
+    say(
+        fig,
+        f"""Real contact area divided by nominal area (a) and {labels[1].partition("  ")[0]} divided by rms height (b)
+        at the load given in the figure.""",
+        _TABOR,
+        """A line joins runs that differ only in the range of attraction. At a given surface energy, asperities with a
+        longer range (smaller Tabor parameter) jump into contact from a larger distance.""",
+        "Dashed lines are results without adhesion." if bare else "",
+    )
+    drawn = []
+    for (contact, applicable), line in curves.items():
+        points = Points(line, "tabor_parameter", *_STATE)
+        for number, ax in enumerate(panels, 1):
+            points.draw(ax, looks.look(contact, applicable=applicable), number)
+        drawn += points.means[0].tolist()
+    for k, (contact, line) in enumerate(bare.items()):
+        look = {"color": looks.colour(contact) if looks.by_place else GREY, "label": None if k else "no adhesion"}
+        for ax, name in zip(panels, _STATE, strict=True):
+            mean = np.mean([float(state[name]) for group in line for state in group.by_seed.values()])
+            record(ax, [min(drawn), max(drawn)], [mean, mean], line[0].drawn_name)
+            ax.axhline(mean, ls=(0, (5, 2)), lw=1, zorder=1, **look)
+    for ax, label in zip(panels, labels, strict=True):
+        if max(drawn) > _TABOR_SPAN * min(drawn):
+            logarithmic_axes(ax, "x")
+        _shade_unverified(ax, min(drawn))
+        ax.set(xlabel=label_of("tabor_parameter"), ylabel=label)
+    panels[0].set_title(shown, loc="right")
+    legend_below(fig, looks.handles())
+    return fig
+
+
+def _shade_unverified(ax, smallest):
+    """Shade the range of Tabor parameters without verified jump into contact, and widen the y axis."""
+    from icha.asperity.material import WU_HOLDS_FROM
+
+    low, high = ax.get_xlim()
+    # The tolerance allows for a range of attraction that was rounded.
+    if smallest < WU_HOLDS_FROM / 1.01:
+        ax.axvspan(low, WU_HOLDS_FROM, color="0.93", lw=0, zorder=0, label="jump-in distance not verified")
+    ax.set_xlim(low, high)
+    # The limits of the axis are wider than the values, so that differences of a few per mille do not fill the panel.
+    bottom, top = ax.get_ylim()
+    ax.set_ylim(0.95 * bottom, 1.05 * top)
+
+
+def _pull_off_of_spheres(runs):
+    """Draw pull-off force and loss of smooth spheres against the Tabor parameter, with the limits of JKR and DMT."""
+    from icha.asperity.tabor import sphere_pull_off_factor
+
+    runs = sorted(runs, key=lambda run: float(run["tabor_parameter"]))
+    at, pull_off, loss = np.array([_values_of_sphere(run) for run in runs]).T
+    resolved = np.array([run.attrs.get("attraction") == FINITE_RANGE for run in runs])
+    fig, [panels] = new_panels(3.1)
+    say(
+        fig,
+        "Pull-off force (a) and energy lost from first contact to separation (b) of smooth spheres.",
+        _TABOR,
+        "Filled markers are boundary elements at the range itself." if resolved.any() else "",
+        "Open markers are boundary elements in the limit of a short range." if not resolved.all() else "",
+        "The solid line is the theory of Maugis for a constant attraction. JKR and DMT are its limits.",
+    )
+    for ax, values in zip(panels, (pull_off, loss), strict=True):
+        ax.plot(at, values, color=GREY, lw=0.6, zorder=1)
+        for chosen, fill, label in ((resolved, "C0", FINITE_RANGE), (~resolved, "white", SHORT_RANGE)):
+            if chosen.any():
+                plot(ax, at[chosen], values[chosen], ls="none", marker="o", ms=4.5, mec="C0", mfc=fill, label=label)
+        logarithmic_axes(ax, "x")
+        ax.set_xlabel(label_of("tabor_parameter"))
+    along = np.geomspace(at.min(), at.max(), 200)
+    theory = [sphere_pull_off_factor(each) for each in along]
+    plot(panels[0], along, theory, color="0.3", lw=1, label="theory of Maugis")
+    for limit, name, style in ((1.5, "JKR", (0, (5, 2))), (2.0, "DMT", ":")):
+        panels[0].axhline(limit, color="0.3", lw=0.9, ls=style, label=name)
+    panels[0].set(ylabel=r"pull-off force$\,/\,\pi\Delta\gamma R$", ylim=(1.4, 2.1))
+    panels[1].set_ylabel(r"loss$\,/\,(\Delta\gamma^5 R^4/E^{*2})^{1/3}$")
+    legend_below(fig, {})
+    return fig
+
+
+def _values_of_sphere(run):
+    """Return Tabor parameter, pull-off force over pi dgamma R, and loss over (dgamma^5 R^4/E*^2)^(1/3)."""
+    energy, R, modulus = (float(run[name]) for name in ("surface_energy", "shape_radius", "contact_modulus"))
+    loss = float(run["hysteresis_loss"]) * float(run["period"]) ** 2
+    unit = np.cbrt(energy**5 * R**4 / modulus**2)
+    return float(run["tabor_parameter"]), float(run["pull_off_force"]) / (np.pi * energy * R), loss / unit
+
+
+# --- figure 14 ---
+
+# The axis is linear if the ratio of the largest to the smallest positive value is at most this number, without and with
+# zeros.
+_SPAN, _SPAN_WITH_ZEROS = 5.0, 30.0
+_LINE = {"lw": 0.9, "ls": "-"}
+_TRUTH = {name: TRUTH_LINE[name] for name in ("lw", "ls")}
+# Oblique crosses can be told from bars.
+_OBLIQUE = UNLOADING_MARKERS[REFERENCE_NAME]
+# Points at the same slope or load are drawn side by side. The last and the first of many lines have nearly this ratio,
+# or the root of the ratio of the closest different values; values count as the same up to the second ratio.
+_SPREAD, _SAME = 1.15, 1.001
+# A slope has a tick if its ratio to the next smaller slope is at least this number.
+_APART = 1.06
+# Size of the markers, divided by the usual size, so that short bars are visible.
+_SMALLER = 0.7
+# Variable on the y axis.
+_Y = "pull_off_pressure"
+
+
+@in_style
+def pull_off(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = ()) -> Figure:
+    """Draw the pull-off pressure (mean over the seeds) against slope, and against the largest load of the path."""
+    studies = list(dict.fromkeys([study, *load_studies]))
+    by_slope = select_detached_lines(campaign, [study], quantity=_Y, along_slopes=True, both_models=True)
+    by_load = select_detached_lines(campaign, list(dict.fromkeys(load_studies)), quantity=_Y, both_models=True)
+    points = list(itertools.chain(*by_slope.values(), *by_load.values()))
+    if len({point.labels.rms_slope for point in points}) == 1:  # the same markers in both panels
+        by_load = {((*contact[:2], None), *of): line for (contact, *of), line in by_load.items()}
+    models = _models_of(points)
+    keys = [*by_slope, *by_load]
+    looks = Looks(campaign, studies, [contact for contact, *_ in keys], by_place=None, crosses=len(models) > 1)
+    factor, unit = choose_unit(max(float(run[_Y]) for point in points for run in point.by_seed.values()), "Pa")
+
+    fig, [panels] = new_panels(2.9, columns=2 if by_load else 1, width=TWO_COLUMNS if by_load else ONE_COLUMN)
+    second = " (a) and against the largest reduced pressure F/(E* h'rms A0) of the path (b)" if by_load else ""
+    say(
+        fig,
+        f"""Pull-off pressure against the rms slope{second} of runs that separated completely. The pull-off pressure is
+        the largest nominal tension in unloading.""",
+    )
+    for ax, x, drawn in zip(panels, ("rms_slope", "largest_reduced_pressure"), (by_slope, by_load), strict=False):
+        lines = {key: Points(line, x, _Y, factor=factor) for key, line in drawn.items()}
+        spread = _spread([line.means[0] for line in lines.values()])
+        for position, ((contact, applicable, model), line) in enumerate(lines.items()):
+            if len(models) > 1 and model == REFERENCE_MODEL:
+                look = looks.cross(contact, applicable=applicable, shape=_OBLIQUE) | _TRUTH
+            else:
+                look = looks.look(contact, applicable=applicable, model=model) | _LINE
+            look["ms"] *= _SMALLER
+            line.draw(ax, look, shift=spread ** ((position + 0.5) / len(lines) - 0.5))
+        loads, values = np.concatenate([line.means for line in lines.values()], axis=1)
+        _scale_pull_off(ax, values)
+        ax.set(xlabel=label_of(x), ylabel=label_of(_Y, unit))
+    _scale_slopes(panels[0], sorted({point.labels.rms_slope for line in by_slope.values() for point in line}))
+    if by_load and loads.min() > 0:
+        logarithmic_axes(panels[1], "x")
+        panels[1].set_xlim(loads.min() / 1.6, loads.max() * 1.6)
+    handles = looks.handles(**_LINE)
+    if len(models) > 1:
+        handles = looks.colour_handles() if looks.by_place else handles
+        handles |= {ASPERITIES_NAME: model_handle(ASPERITIES_NAME, **_LINE | looks.fill())}
+        crossed = [contact for contact, _, model in keys if model == REFERENCE_MODEL]
+        several = any(map(looks.rank, crossed))
+        for contact in crossed:
+            words = [REFERENCE_NAME, *([looks.shape_name(contact)] if several else [])]
+            look = {"marker": looks.cross(contact, shape=_OBLIQUE)["marker"]} | _TRUTH
+            handles[", ".join(words)] = model_handle(REFERENCE_NAME, **look)
+        say(
+            fig,
+            f"""{"Crosses and stars" if several else "Crosses"} with dashed lines are boundary elements, other symbols
+            are the asperity model, on the same topographies.""",
+        )
+    say(
+        fig,
+        only_model(models),
+        range_of_attraction(attractions_of(run for point in points for run in point.by_seed.values())),
+        f"Points at one slope{' or load' if by_load else ''} are drawn side by side; lines guide the eye.",
+        "Without adhesion (open markers), pull-off is zero; a logarithmic axis is linear near zero."
+        if not all(point.surface_energy for point in points)
+        else "",
+        grid_of_loops(campaign, studies),
+    )
+    title = [models[0] if len(models) == 1 else None, looks.heading()]
+    panels[0].set_title(", ".join(filter(None, title)), loc="right", fontsize=8)
+    legend_below(fig, handles)
+    return fig
+
+
+def _models_of(points):
+    """Return the names of the models of some runs in legends and titles."""
+    return list(dict.fromkeys(MODELS[point.labels.model].words for point in points))
+
+
+def _scale_pull_off(ax, values):
+    """Set a linear y axis; if values span much, a logarithmic axis, which is linear near zero if there are zeros."""
+    from matplotlib.ticker import LogLocator
+
+    positive = drop_rounding_errors(values)
+    zeros = len(positive) < np.isfinite(values).sum()
+    if len(positive) and not zeros and positive.max() > _SPAN * positive.min():
+        ax.set_yscale("log")
+        ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        ax.yaxis.set_major_formatter("{x:g}")
+        ax.yaxis.set_minor_formatter("")
+        return
+    if len(positive) and positive.max() > _SPAN_WITH_ZEROS * positive.min():
+        least = 10.0 ** np.floor(np.log10(positive.min()))
+        ax.set_yscale("symlog", linthresh=least, linscale=0.4)
+        ax.set_ylim(-0.3 * least, 2 * positive.max())
+    elif len(positive):
+        ax.set_ylim(bottom=-0.04 * positive.max())
+    ax.axhline(0, color=GREY, lw=0.6, zorder=1)
+
+
+def _scale_slopes(ax, slopes):
+    """Set scale, limits and ticks of an axis of slopes, in ascending order."""
+    ax.set_xscale("log" if slopes[-1] > 3 * slopes[0] > 0 else "linear")
+    room = 0.25 * (slopes[-1] or 1)  # a smooth shape has the slope 0
+    ax.set_xlim(slopes[0] / 1.25 if slopes[0] else -room, slopes[-1] + room)
+    ticks = [slope for k, slope in enumerate(slopes) if not k or slope > _APART * slopes[k - 1]]
+    ax.set_xticks(ticks, [f"{slope:.4g}" for slope in ticks])
+    ax.xaxis.minorticks_off()
+
+
+def _spread(positions):
+    """Return the ratio of the last and the first of points side by side, so that points keep their order."""
+    values = np.unique(np.concatenate(positions))
+    ratios = values[1:] / values[:-1] if values.size and values[0] > 0 else np.empty(0)
+    return min([_SPREAD, *np.sqrt(ratios[ratios > _SAME])])
+
+
+# --- figure 15 ---
+
+# Look of the bar of each part of the loss. No bar has the colour of a material.
+_PART_LOOKS = (
+    {"fc": "0.25"},
+    {"fc": "0.65"},
+    {"fc": "white", "hatch": "//////"},
+    {"fc": "0.85", "hatch": "xxxx"},
+    {"fc": "white", "hatch": "||||"},
+    {"fc": "white", "hatch": "...."},
+)
+PARTS = dict(zip(LOSS_PARTS, _PART_LOOKS, strict=True))
+# Smallest number of points for a fitted line, because a straight line passes through any two points.
+_LEAST_POINTS = 3
+_FIT_POINTS = 100
+# Both axes are logarithmic if, on each axis, the ratio of the largest to the smallest value exceeds this number.
+_LOSS_SPAN = 30.0
+# A part of the loss is drawn if the magnitude of its share reaches this number in at least one bar.
+_LEAST_SHARE = 1e-6
+# Variables along x and y.
+_LOSS = ("largest_contact_area_fraction", "hysteresis_loss_over_surface_energy")
+# Opacity of the bars of runs to which the model is not applicable.
+_PALE = 0.35
+
+_FIT = """Lines are least-squares fits of a straight line to points that differ only in their largest load. The legend
+gives the coefficient of determination r² and the exponent of a power law through the same points; the exponent is 1 if
+the loss is proportional to the contact area. Violano and Afferrante (Lubricants 9 (2021) 7) found a linear growth of
+the loss."""
+
+
+@in_style
+def loss(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
+    """Draw the loss of runs with adhesion (mean over the seeds), and the parts of this loss by cause."""
+    from matplotlib.patches import Patch
+
+    studies = list(dict.fromkeys(studies))
+    runs = select_detached_lines(campaign, studies, quantity="hysteresis_loss", both_models=True)
+    runs = {key: line for key, line in runs.items() if line[0].surface_energy > 0}
+    if not runs:
+        raise NothingToDraw(f"studies {', '.join(studies)}: no run with adhesion; the figure needs a surface energy")
+    several = len({model for *_, model in runs}) > 1
+    looks = Looks(campaign, studies, [contact for contact, *_ in runs], by_place=None, crosses=several)
+    truths = {key: line for key, line in runs.items() if several and key[-1] == REFERENCE_MODEL}
+    lines = {key: line for key, line in runs.items() if key not in truths}
+
+    fig, [(left, right)] = new_panels(3.1, width_ratios=(1.25, 1))
+    every = list(itertools.chain(*lines.values(), *truths.values()))
+    models = _models_of(every)
+    say(
+        fig,
+        """Hysteresis loss of runs with adhesion, divided by the surface energy, against the largest contact area on the
+        path divided by the nominal area (a). The loss is the energy per nominal area that is dissipated on a path from
+        first contact to the largest load and back to complete separation.""",
+        "Crosses are boundary elements, other symbols the asperity model." if truths else only_model(models),
+        "With boundary elements, the loss is known to 0.1 % of the largest work done in loading."
+        if models != [ASPERITIES_NAME]
+        else "",
+        range_of_attraction(attractions_of(run for group in every for run in group.by_seed.values())),
+    )
+    handles = _draw_losses(left, lines, truths, looks)
+    if truths:
+        names = {ASPERITIES_NAME: looks.fill(), REFERENCE_NAME: {}}
+        handles |= {name: model_handle(name, **look) for name, look in names.items()}
+    else:
+        left.set_title(", ".join(models), loc="right")
+    shown = _draw_parts(right, lines, looks)
+    say(
+        fig,
+        """Panel (b) shows the causes of the loss at the largest load of every series of panel (a), with the marker of
+        the series below the bar.""",
+        "The causes are those of the asperity model." if truths else "",
+        """Negative parts are energy gained when spots unite or separate. Each part is divided by the sum of the
+        magnitudes of all parts.""",
+        "The unattributed loss has none of these causes." if "loss_unattributed" in shown else "",
+        grid_of_loops(campaign, studies),
+    )
+    handles |= {label_of(name): Patch(ec="black", lw=0.5, **PARTS[name]) for name in shown}
+    legend_below(fig, handles, looks.heading(), rows=looks.slopes_per_surface)
+    return fig
+
+
+def _draw_losses(ax, runs, truths, looks):
+    """Draw the losses of runs with fits, and boundary elements; return legend entries."""
+    drawn = {key: Points(line, *_LOSS) for key, line in (runs | truths).items()}
+    handles = looks.handles(ls="none") if looks.many else {}
+    for key, line in drawn.items():
+        contact, applicable, model = key
+        if key in truths:
+            line.draw(ax, looks.cross(contact, applicable=applicable))
+            continue
+        handle = line.draw(ax, looks.look(contact, applicable=applicable, model=model) | {"ls": "none"})
+        if not applicable:
+            continue
+        (x, y), words = line.means, ""
+        if line.same_seeds and len(np.unique(x)) >= _LEAST_POINTS:
+            along = np.linspace(x.min(), x.max(), _FIT_POINTS)
+            values, r_squared, exponent = fit_line(x, y, along)
+            say(ax, _FIT)
+            words = f": $r^2$ = {r_squared:.4f}, exponent {exponent:.2f}"
+            look = {"color": looks.colour(contact), "lw": 0.9, "zorder": 2}
+            plot(ax, along, values, line.name._replace(curve="fitted line"), **look)
+        if not looks.many:
+            handles[looks.name(contact) + words] = handle
+    means = np.concatenate([line.means for line in drawn.values()], axis=1)
+    if all(values.min() > 0 and values.max() > _LOSS_SPAN * values.min() for values in means):
+        logarithmic_axes(ax)
+    ax.axhline(0, color=GREY, lw=0.6, zorder=1)
+    ax.set(xlabel=label_of(_LOSS[0]), ylabel=label_of(_LOSS[1]))
+    return handles
+
+
+def fit_line(x: np.ndarray, y: np.ndarray, along: np.ndarray) -> tuple[np.ndarray, float, float]:
+    """Fit a straight line by least squares.
+
+    Returns
+    -------
+    Values of the line at `along`; coefficient of determination; exponent of a power law through the same points. The
+    exponent is NaN if a value of y is not positive.
+    """
+    from scipy.stats import linregress
+
+    line = linregress(x, y)
+    exponent = linregress(np.log(x), np.log(y)).slope if np.all(y > 0) else np.nan
+    return line.intercept + line.slope * along, line.rvalue**2, exponent
+
+
+def shares(line: Sequence[ContactRuns]) -> dict[str, float]:
+    """Return the parts of the loss at the largest load of a line, divided by the sum of the magnitudes of all parts."""
+    parts = Points(line, "largest_reduced_pressure", *PARTS).means[1:, -1]
+    total = np.abs(parts).sum()
+    return dict(zip(PARTS, parts / total if total > 0 else parts, strict=True))
+
+
+def _draw_parts(ax, runs, looks):
+    """Draw the parts of the loss of every line as a stacked bar; return the names of the drawn parts."""
+    bars = {key: shares(line) for key, line in runs.items()}
+    shown = [name for name in PARTS if any(abs(bar[name]) >= _LEAST_SHARE for bar in bars.values())]
+    for position, ((contact, applicable, model), bar) in enumerate(bars.items()):
+        above, below = 0.0, 0.0
+        for name in shown:
+            share = 100 * bar[name]
+            part = Name(label_of(name), RunLabels(None, model, contact[1], None, contact[2], contact[0]))
+            record(ax, [position], [share], part)
+            bar_look = {"ec": "black", "lw": 0.4, "alpha": None if applicable else _PALE} | PARTS[name]
+            ax.bar(position, share, 0.8, bottom=above if share > 0 else below, **bar_look)
+            above, below = above + max(share, 0), below + min(share, 0)
+        look = looks.look(contact, applicable=applicable, model=model)
+        ax.plot(position, -0.055, transform=ax.get_xaxis_transform(), clip_on=False, **look | {"ls": "none"})
+    ax.axhline(0, color="black", lw=0.6)
+    ax.set(xlim=(-0.7, len(bars) - 0.3), ylabel="share of losses and gains (%)")
+    ax.set_xticks(range(len(bars)), [looks.place_name(tuple(place)) for (_, *place), *_ in bars], rotation=90)
+    ax.tick_params("x", length=0, pad=14, labelsize=7)
+    ax.set_xlabel("series of (a), at their largest load", labelpad=2)
+    return shown
+
+
+# --- figure 19 ---
+
+# Name in the legend and marker of each quantity.
+_WORKS = {
+    "work_of_adhesion_approach": ("JKR fit to loading", "o"),
+    "work_of_adhesion_retraction": ("JKR fit to unloading", "s"),
+    "pull_off_force_over_jkr": ("pull-off force over that of JKR", "^"),
+}
+_ONE_SEED = {"ls": "none", "ms": 3.2, "mew": 0.6, "mfc": "white"}
+_MEAN = {"lw": 0.9, "ms": 5.0}
+
+_WORK = """Apparent work of adhesion of rough spheres, divided by the work of adhesion Δγ of the material, against the
+rms height of the roughness. Circles are fits of the theory of Johnson, Kendall and Roberts (JKR) to the first loading,
+squares fits to the last unloading up to the largest tension. Each fit compares cubes of contact radii at given forces,
+with the given E* and R. Triangles are the pull-off force divided by the pull-off force 3/2 π Δγ R of a smooth sphere.
+Closed markers are means over the seeds; open markers are the single seeds. Lines join means of the same surface or
+shape and the same material. Values of a smooth sphere by JKR are 1."""
+
+
+@in_style
+def work_of_adhesion(campaign: xr.DataTree, *, study: str) -> Figure:
+    """Draw works of adhesion of fits and of pull-off, divided by the surface energy.
+
+    Lines join means over seeds of series that differ only in their rms height.
+    """
+    series = select_series(campaign, study, only_jkr=True)
+    if not any("pull_off_force_over_jkr" in run for each in series for run in each.runs.by_seed.values()):
+        raise NothingToDraw(f"study {study}: no sphere with adhesion was pulled off; see the surfaces and materials")
+    largest = max(float(run["rms_height"]) for each in series for run in each.runs.by_seed.values())
+    scale, unit = choose_unit(largest, "m")
+    contacts = list(dict.fromkeys(each.contact for each in series))
+    colours = dict(zip(contacts, distinct_colours(len(contacts)), strict=True))
+    fig = new_figure(1.25 * ONE_COLUMN, 2.9)
+    ax = fig.subplots()
+    dataset = campaign[study].to_dataset()
+    say(fig, _WORK, without_fit(dataset), only_spheres(dataset))
+    handles = {name: legend_handle(color=colour, lw=4) for name, colour in colours.items() if name}
+    for (k, (quantity, (name, marker))), contact in itertools.product(enumerate(_WORKS.items()), contacts):
+        # Colours distinguish the quantities, or surfaces and materials if there are several.
+        colour, means = colours[contact] if contact else COLOURS[k], []
+        for group in (each.runs for each in series if each.contact == contact):
+            unit_of_work = 1.0 if quantity == "pull_off_force_over_jkr" else group.surface_energy
+            runs = [run for run in group.by_seed.values() if quantity in run]
+            points = [(float(run["rms_height"]) * scale, float(run[quantity]) / unit_of_work) for run in runs]
+            if points:
+                of_seeds = Name(f"{name}, single seeds", group.labels._replace(seed=None))
+                plot(ax, *np.transpose(points), of_seeds, marker=marker, mec=colour, **_ONE_SEED)
+                means.append(np.mean(points, axis=0))
+        if means:
+            plot(ax, *np.transpose(means), f"{name}, mean", marker=marker, color=colour, **_MEAN)
+            handles[name] = legend_handle(color=GREY if contact else colour, marker=marker, **_MEAN)
+    ax.axhline(1, color=GREY, lw=0.6, zorder=0)
+    ax.set(xlabel=f"rms height of the roughness ({unit})", ylabel=r"work of adhesion over $\Delta\gamma$")
+    ax.margins(y=0.15)
+    if not largest:
+        ax.set_xticks([0])
+    legend_below(fig, handles)
+    return fig

@@ -1,0 +1,513 @@
+"""Figures that are maps of one topography: contact spots (4, 6), jumps of spots (16), contact pressure (20)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from icha.contact.model import EVENT_KINDS
+from icha.contact.models import REFERENCE_MODEL
+from icha.datasets.labels import RunLabels
+from icha.datasets.quantities import label_of
+from icha.figures.captions import attractions_of, grid_of_loops, range_of_attraction
+from icha.figures.drawn import Name, plot, record, say
+from icha.figures.looks import (
+    BRANCH_DASHES,
+    COARSE_GRID_ALONE,
+    NOT_APPLICABLE_ALONE,
+    REFERENCE_NAME,
+    graded_colours,
+    legend_below,
+    run_label,
+)
+from icha.figures.maps import (
+    average_blocks,
+    draw_map,
+    draw_spots,
+    record_spots,
+    spot_circles,
+    topography_of,
+    without_images,
+)
+from icha.figures.select import (
+    NothingToDraw,
+    is_applicable,
+    is_good_loop,
+    select_by_labels,
+    select_complete_run,
+    select_runs,
+    snapshot_label,
+    unloading_legs,
+)
+from icha.figures.style import (
+    BLACK,
+    BLUE,
+    GREY,
+    format_number,
+    in_style,
+    legend_handle,
+    material_label,
+    new_grid,
+    new_panels,
+    slope_label,
+)
+from icha.support.formatting import choose_unit, format_quantity
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+# Colour of spots, and of events that break or separate spots.
+_RED = (0.9, 0.0, 0.05)
+
+# --- figure 4 ---
+
+# The surface is _ZOOM times as wide as the enlarged window. A window that is wider than _WIDEST_IN_RADII times the mean
+# radius of the spots is halved repeatedly, but not to fewer than _LEAST_CELLS cells along a side.
+_ZOOM = 4
+_WIDEST_IN_RADII = 40
+_LEAST_CELLS = 64
+# Largest number of spots that are drawn as vector graphics. More spots become an image, so that PDF files stay small.
+_MANY_SPOTS = 2000
+# Names and colours of nodes: in contact in no model, only with asperities, only with boundary elements, in both models.
+_NODES = (("", "white"), ("asperities only", _RED), ("boundary elements only", "black"), ("both", "0.72"))
+
+_SPOTS = """Contact spots of the asperity model (red, in true size and position) on a map of the topography, whose
+mean height is zero. The title gives surface, material and load."""
+_COMPARED = """Panel (b) shows the contact of boundary elements on the same topography at the same load (black). Panel
+(c) enlarges the framed region around the largest spot of (a): edges of contact of the asperity model (red) and of
+boundary elements (black), also of holes. Panel (d) shows where both models are in contact, and where only one is; the
+overlap is the ratio of the areas in contact in both models and in at least one."""
+
+
+@in_style
+def contact_map(
+    campaign: xr.DataTree,
+    surface: xr.Dataset,
+    truth: xr.Dataset | None = None,
+    *,
+    run: Sequence,
+    kind: str | None = None,
+    target: float | None = None,
+) -> Figure:
+    """Draw the spots of one snapshot of one run.
+
+    Parameters
+    ----------
+    campaign : the campaign dataset.
+    surface : dataset of the surface file, with the topography of the run.
+    truth : dataset of the same run with boundary elements, including contact maps; None without such a run.
+    run : labels of the run.
+    kind, target : kind and target of the snapshot; None for the first snapshot.
+    """
+    from matplotlib.patches import Rectangle
+
+    from icha.analysis.model_error import contact_of_spots, snapshot_if_any, state_of
+    from icha.datasets.campaign import find_snapshot
+
+    labels = RunLabels(*run)
+    data = select_complete_run(campaign, labels)
+    at = find_snapshot(data, kind, target)
+    state, beside = state_of(data, at), None
+    kind, target = str(data["snapshot_kind"].values[at]), float(data["snapshot_target"].values[at])
+    # The run with boundary elements may have ended before this snapshot.
+    if truth is not None and (same := snapshot_if_any(truth, kind, target)) is not None:
+        beside = state_of(truth, same)
+    topography = topography_of(data, surface)
+    circles = spot_circles(data, at, topography.length)
+    corner, width = _view(circles, topography)
+    fig, panels = new_panels(*(3.35, 1) if beside is None else (6.9, 2))
+    say(fig, _SPOTS)
+    whole, enlarged = panels[0, 0], panels[0, 1] if beside is None else panels[1, 0]
+    heights = {"cmap": "cividis", "vmin": -topography.highest, "vmax": topography.highest}
+    image = topography.draw(whole, **heights)
+    draw_spots(whole, circles, facecolor=(*_RED, 0.85), lw=0, rasterized=len(circles) > _MANY_SPOTS)
+    record_spots(whole, circles, topography.side, Name("spots", labels))
+    nodes, borders = _window(topography.heights, topography.side, corner, width)
+    enlarged.imshow(nodes * topography.scale, extent=borders, origin="lower", interpolation="nearest", **heights)
+    colour = (*_RED, 0.4) if beside is None else "none"
+    draw_spots(enlarged, circles, facecolor=colour, edgecolor=_RED, lw=1.0)
+    area = rf"$A/A_0$ = {float(state['contact_area_fraction']):.3f}"
+    whole.set_title(area if beside is None else f"asperities, {area}", loc="right")
+    enlarged.set_title(f"enlarged ×{topography.side / width:.0f}", loc="right")
+    if beside is None:
+        say(fig, "Panel (b) enlarges the framed region around the largest spot.")
+    else:
+        say(fig, _COMPARED, range_of_attraction(attractions_of([truth])))
+        covered = contact_of_spots(data, at, len(beside["contact_map"]))
+        _draw_boundary_elements(panels, topography, (corner, width), heights, beside, covered)
+    if str(data["boundary"].values) == "periodic":
+        say(fig, "The map is one period; circles continue across its borders.")
+    load = rf"$F/(E^{{\ast}}h′_{{\mathrm{{rms}}}}A_0)$ = {format_number(float(state['reduced_pressure']))}"
+    title = f"{run_label(campaign, labels)}, {load}"
+    fig.suptitle(title if is_applicable(data) else f"{title}\n{NOT_APPLICABLE_ALONE}", fontsize="medium")
+    for ax in panels.ravel():
+        topography.label(ax)
+        if ax is not enlarged:
+            frame = "white" if ax.get_images()[0].get_array().ndim == 2 else BLUE
+            ax.add_patch(Rectangle(corner, width, width, fill=False, ec=frame, lw=1.2))
+    enlarged.set(xlim=corner[0] + np.array([0, width]), ylim=corner[1] + np.array([0, width]))
+    bar = fig.colorbar(image, ax=panels, shrink=0.92 if beside is None else 0.46, pad=0.015, aspect=28)
+    bar.set_label(f"height ({topography.height_unit})")
+    return fig
+
+
+def _view(circles, topography):
+    """Return the lower left corner and the side of the enlarged window around the largest spot, in axis units."""
+    side = topography.side
+    x, y, radius = without_images(circles, side).T
+    typical = float(np.sum(radius**3) / np.sum(radius**2)) if radius.any() else side
+    zoom = _ZOOM
+    while side / zoom > _WIDEST_IN_RADII * typical and len(topography.heights) / (2 * zoom) >= _LEAST_CELLS:
+        zoom *= 2
+    largest = np.argmax(radius) if len(radius) else None
+    middle = np.array([side, side]) / 2 if largest is None else np.array([x[largest], y[largest]])
+    corner = np.clip(middle - side / zoom / 2, 0, side - side / zoom)
+    return corner, side / zoom
+
+
+def _draw_boundary_elements(panels, topography, window, heights, beside, covered):
+    """Draw the contact regions of boundary elements, the edges of these regions in the window, and the overlap."""
+    from matplotlib.colors import LinearSegmentedColormap, to_rgb
+    from matplotlib.patches import Patch
+
+    from icha.analysis.model_error import jaccard
+
+    (_, solution), (enlarged, compared) = panels
+    fraction = beside["contact_map"].transpose("row", "column").values.astype(float)
+    contact = fraction >= 0.5
+    topography.draw(solution, **heights)
+    black = LinearSegmentedColormap.from_list("contact", [(0, 0, 0, 0), (0, 0, 0, 1)])
+    draw_map(solution, fraction, topography.side, cmap=black, vmin=0, vmax=1)
+    nodes, borders = _window(fraction, topography.side, *window)
+    enlarged.contour(nodes, [0.5], extent=borders, origin="lower", colors="black", linewidths=0.9)
+    enlarged.legend(
+        handles=[
+            legend_handle(color=_RED, lw=1.0, label="asperities (edge)"),
+            legend_handle(color="black", lw=0.9, label="boundary elements (edge)"),
+        ],
+        loc="upper center",
+        bbox_to_anchor=(0.5, -0.17),
+        ncols=2,
+    )
+    palette = np.array([to_rgb(colour) for _, colour in _NODES])
+    draw_map(compared, palette[1 * covered + 2 * contact], topography.side)
+    keys = [Patch(fc=colour, label=name) for name, colour in _NODES if name]
+    compared.legend(handles=keys, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=3, columnspacing=1.0)
+    solution.set_title(rf"{REFERENCE_NAME}, $A/A_0$ = {float(beside['contact_area_fraction']):.3f}", loc="right")
+    compared.set_title(f"overlap (both / at least one) {jaccard(covered, contact):.2f}", loc="right")
+
+
+def _window(nodes, side, corner, width):
+    """Return the nodes of a periodic map that cover a window, and the coordinates of the four sides of this region."""
+    cell = side / len(nodes)
+    columns, rows = (
+        np.arange(start, start + int(np.ceil(width / cell)) + 2) for start in np.floor(corner / cell).astype(int)
+    )
+    borders = tuple(float(edge) * cell for at in (columns, rows) for edge in (at[0] - 0.5, at[-1] + 0.5))
+    return nodes[np.ix_(rows % len(nodes), columns % len(nodes))], borders
+
+
+# --- figure 6 ---
+
+_SNAPSHOTS = ("relative_load", "area_fraction")
+
+
+@in_style
+def spots_by_slope(
+    campaign: xr.DataTree,
+    *,
+    study: str,
+    surface: str | None = None,
+    seed: int | None = None,
+    material: str | None = None,
+) -> Figure:
+    """Draw the spots of all slopes for one surface, seed and material; the defaults are those of the first run."""
+    from matplotlib.patches import Patch
+
+    runs = select_by_labels(select_runs(campaign, study), surface=surface, seed=seed, material=material)
+    by_slope = {labels.rms_slope: run for labels, run in runs}
+    names = {labels.rms_slope: Name("spots", labels) for labels, _ in runs}
+    slopes = sorted(by_slope, reverse=True)
+    # Slopes have colours from dark to bright, because the other colours stand for materials.
+    colours = dict(zip(slopes, graded_colours(len(slopes)), strict=True))
+
+    fig, [panels] = new_panels(3.8, sharey=True)
+    say(
+        fig,
+        """Contact spots of the asperity model, in true size, on one topography that is scaled to several rms slopes.
+        All slopes have the same load F/(E* A0) in panel (a), and the same contact area A/A0 in panel (b). At a given
+        load, a steeper surface has less contact area. Its spots lie within the spots of flatter surfaces, and are drawn
+        on top of them. At a given contact area, the spots of all slopes nearly coincide, so every slope fills one
+        sector of each circle in panel (b).""",
+    )
+    length, unit = choose_unit(float(by_slope[slopes[0]]["period"]), "m")
+    for ax, kind in zip(panels, _SNAPSHOTS, strict=True):
+        _draw_slopes(ax, by_slope, names, kind, colours, length)
+        ax.set_aspect("equal")
+        ax.set_xlabel(f"$x$ ({unit})")
+    panels[0].set_ylabel(f"$y$ ({unit})")
+    words = {
+        slope: slope_label(slope) + ("" if is_applicable(run) else f" ({NOT_APPLICABLE_ALONE})")
+        for slope, run in by_slope.items()
+    }
+    legend_below(fig, {words[slope]: Patch(facecolor=colours[slope]) for slope in slopes})
+    return fig
+
+
+def _draw_slopes(ax, runs, names, kind, colours, length):
+    """Draw the spots of each slope at the first snapshot of a kind; `runs` and `names` are by slope."""
+    from matplotlib.collections import PatchCollection
+    from matplotlib.patches import Wedge
+
+    from icha.analysis.model_error import state_of
+    from icha.datasets.campaign import find_snapshot
+
+    at = {slope: find_snapshot(run, kind) for slope, run in runs.items()}
+    areas = {slope: float(state_of(run, at[slope])["contact_area_fraction"]) for slope, run in runs.items()}
+    # Slopes with less contact area are drawn on top of slopes with more contact area.
+    for order, slope in enumerate(sorted(colours, key=areas.get, reverse=True)):
+        run, look = runs[slope], {"facecolor": colours[slope], "edgecolor": "black", "lw": 0.25}
+        side, circles = float(run["period"]) * length, spot_circles(run, at[slope], length)
+        record_spots(ax, circles, side, names[slope])
+        if kind == "relative_load":
+            draw_spots(ax, circles, zorder=2 + order, **look)
+        else:
+            # The spots of all slopes nearly coincide. Each slope fills a sector of the circle, so that all slopes show.
+            share = 360 / len(runs)
+            start = 90 + share * list(colours).index(slope)
+            ax.add_collection(PatchCollection([Wedge((x, y), r, start, start + share) for x, y, r in circles], **look))
+    ax.set(xlim=(0, side), ylim=(0, side))
+    sectors = "" if kind == "relative_load" or len(runs) == 1 else ", a sector for each slope"
+    ax.set_title(snapshot_label(run, at[slope]) + sectors, loc="right")
+
+
+# --- figure 16 ---
+
+# Each kind of event has a name in the legend, a branch for which the map shows the events, and a look of the marks.
+# Marks are black if spots form or unite, and red if spots break or separate. Other colours stand for materials.
+_KINDS = {
+    "jump_in": ("spot formed", "loading", {"marker": "o", "mfc": BLACK, "mec": BLACK}),
+    "jump_off": ("spot broken", "unloading", {"marker": "o", "mfc": "none", "mec": _RED}),
+    "coalescence": ("union", "loading", {"marker": "D", "mfc": "none", "mec": BLACK}),
+    "split": ("union undone", "unloading", {"marker": "+", "mec": _RED}),
+}
+# If every kind has at most _FEW events, marks have the size _SIZE, in points. Otherwise marks are smaller, so that the
+# total area of the marks remains about the same. No mark is smaller than _LEAST_SIZE.
+_FEW = 60
+_SIZE = 5.0
+_LEAST_SIZE = 1.6
+
+
+@in_style
+def snap_map(campaign: xr.DataTree, surface: xr.Dataset, *, run: Sequence) -> Figure:
+    """Draw the events of one run on a map of the topography, and the number of events against the mean separation.
+
+    Parameters
+    ----------
+    campaign : the campaign dataset.
+    surface : dataset of the surface file, with the topography of the run.
+    run : labels of the run.
+    """
+    labels = RunLabels(*run)
+    data = select_complete_run(campaign, labels)
+    events = _events(data)
+    fig, [(where, when)] = new_panels(3.1, width_ratios=(1.3, 1))
+    unions = "coalescence" in events["kind"]
+    say(
+        fig,
+        """Events of one run. Panel (a) shows where spots formed in the first loading and broke in the last unloading,
+        on a map of the topography with the highest parts white.""",
+        "A spot forms by a jump into contact and breaks by a jump off." if float(data["surface_energy"]) else "",
+        "Marks of unions are at the centre of the united spot." if unions else "",
+        """The legend gives the number of marks of each kind. Panel (b) shows the number of events since the beginning
+        of loading (solid lines) or unloading (dashed lines) against the mean separation, in the colours of panel
+        (a).""",
+        "Thin lines count unions." if unions else "",
+        grid_of_loops(campaign, [labels.study]),
+    )
+    handles = _draw_places(where, topography_of(data, surface), events)
+    _draw_counts(when, events)
+    title = f"{material_label(campaign[labels.study].to_dataset(), labels.material)}, {slope_label(labels.rms_slope)}"
+    when.set_title(title, loc="right", fontsize="small")
+    handles |= {name: legend_handle(color=GREY, ls=dashes, lw=1.1) for name, dashes in BRANCH_DASHES.items()}
+    if not is_good_loop(data):
+        words = COARSE_GRID_ALONE if labels.model == REFERENCE_MODEL else NOT_APPLICABLE_ALONE
+        handles |= {words: legend_handle(ls="none")}
+    legend_below(fig, handles)
+    return fig
+
+
+def _draw_places(ax, topography, events):
+    """Draw events over the topography; return the legend entries by name."""
+    # The map is light, so that the marks are visible.
+    image = topography.draw(ax, cmap="gray", vmin=-2.2 * topography.highest, vmax=topography.highest)
+    topography.label(ax)
+    marks = {name: (events["kind"] == name) & (events["branch"] == branch) for name, (_, branch, _) in _KINDS.items()}
+    most = max(np.count_nonzero(shown) for shown in marks.values())
+    size = max(_LEAST_SIZE, _SIZE * min(1.0, (_FEW / max(most, 1)) ** 0.5))
+    handles = {}
+    for name, (words, _, look) in _KINDS.items():
+        shown = marks[name]
+        # Rings are larger than dots, and squares larger than crosses, so that both marks at one position are visible.
+        ring = 1.6 if name in ("jump_off", "coalescence") else 1.0
+        x, y = (events[axis][shown] * topography.length for axis in "xy")
+        points = plot(ax, x, y, words, **{"ls": "none", "ms": ring * size, "mew": 0.9} | look)
+        if shown.any():
+            handles[f"{words} ({np.count_nonzero(shown)})"] = points
+    bar = ax.figure.colorbar(image, ax=ax, shrink=0.9, pad=0.02, aspect=28)
+    bar.set_label(f"height ({topography.height_unit})")
+    bar.ax.set_ylim(-topography.highest, topography.highest)
+    return handles
+
+
+def _draw_counts(ax, events):
+    """Draw the cumulative number of events against the mean separation, by kind of event and branch."""
+    from matplotlib.ticker import MaxNLocator
+
+    for name, (words, _, look) in _KINDS.items():
+        width = 0.6 if name in ("coalescence", "split") else 1.3
+        for branch, dashes in BRANCH_DASHES.items():
+            separation = events["separation"][(events["kind"] == name) & (events["branch"] == branch)]
+            if len(separation):
+                steps, counts = np.append(separation[0], separation), np.arange(len(separation) + 1)
+                line = {"color": look["mec"], "ls": dashes, "lw": width, "drawstyle": "steps-post"}
+                plot(ax, steps, counts, f"{words}, {branch}", **line)
+    ax.set_ylim(bottom=0)
+    ax.yaxis.set_major_locator(MaxNLocator(integer=True))
+    ax.set(xlabel=label_of("reduced_separation"), ylabel="events so far")
+
+
+def _events(run):
+    """Return kind, branch, position (m) and separation u/h_rms of the events in first loading and last unloading."""
+    from icha.datasets.campaign import unit_height
+
+    steps = run["event_step"].values.astype(int)
+    leg = run["leg"].sel(step=steps).values
+    shown = (leg == 0) | (leg == unloading_legs(run)[-1]["leg"].values[-1])
+    return {
+        "kind": np.array(EVENT_KINDS)[run["event_kind"].values[shown].astype(int)],
+        "branch": run["branch"].sel(step=steps).values.astype(object)[shown],
+        "x": run["event_x"].values[shown],
+        "y": run["event_y"].values[shown],
+        "separation": run["event_separation"].values[shown] / float(unit_height(run)),
+    }
+
+
+# --- figure 20 ---
+
+_MOST_MAPS = 6
+# Largest number of cells along a side in the table of a map; of larger maps, the table has every second cell, or fewer.
+_TABLE_CELLS = 128
+# Fraction of the pressures in contact that the colours cover on either side; larger magnitudes have the last colour.
+_COVERED = 0.98
+# Space around the largest contact, divided by its width.
+_MARGIN = 0.15
+
+
+@in_style
+def pressure_maps(campaign: xr.DataTree, maps: xr.Dataset, *, run: Sequence) -> Figure:
+    """Draw the pressure at the snapshots of a run; with more than six snapshots, at six of them.
+
+    Parameters
+    ----------
+    campaign : the campaign dataset.
+    maps : dataset of the file of the run.
+    run : labels of the run.
+    """
+    from matplotlib.colors import TwoSlopeNorm
+
+    labels = RunLabels(*run)
+    select_complete_run(campaign, labels)
+    count = maps.sizes.get("snapshot", 0)
+    touching = maps["contact_map"].transpose("snapshot", "row", "column").values > 0
+    if not touching.any():
+        raise NothingToDraw(f"{labels}: no snapshot has contact")
+    order = np.argsort(maps["snapshot_step"].values, kind="stable")
+    shown = order[np.unique(np.rint(np.linspace(0, count - 1, min(count, _MOST_MAPS))).astype(int))]
+    pressure = maps["contact_pressure"].transpose("snapshot", "row", "column").values
+    inside = np.abs(pressure[touching])
+    factor, unit = choose_unit(float(np.quantile(inside, _COVERED)), "Pa")
+    # Tension has a scale of its own, because it is often smaller than the pressure.
+    most, least = (
+        factor * float(np.quantile(np.abs(part), _COVERED)) if part.size else factor * float(inside.max())
+        for part in (pressure[touching & (pressure > 0)], pressure[touching & (pressure < 0)])
+    )
+    length, length_unit = choose_unit(float(maps["period"]), "m")
+    side = float(maps["period"]) * length
+    fig, panels, columns = new_grid(len(shown), 3, 2.7, 2.15, room=(0.65, 0.1), sharex=True, sharey=True)
+    free = str(maps["boundary"].values) == "free"
+    say(
+        fig,
+        """Maps of the contact pressure at snapshots of one run with boundary elements, in the order of the path.
+        Compression is red, tension is blue, each with its own scale, and grey regions are out of contact.""",
+        "Tension is largest at the edges of contact." if float(maps["surface_energy"]) else "",
+        """The title of a panel gives branch and force. All maps show the region around the largest contact."""
+        if free
+        else """The title of a panel gives the reduced pressure p* = F/(E* h'rms A0) and the contact area, to which
+        cells at the edges contribute in part.""",
+        "The scales end at the 98 % quantiles of pressure and tension in contact in all maps.",
+    )
+    window = _touched_region(touching.any(axis=0), free)
+    for ax, k in zip(panels, shown, strict=True):
+        cells = np.where(touching[k], pressure[k] * factor, np.nan)
+        half = side / len(cells) / 2
+        image = ax.imshow(
+            np.ma.masked_invalid(average_blocks(cells)),
+            extent=(-half, side - half) * 2,
+            origin="lower",
+            interpolation="nearest",
+            cmap="RdBu_r",
+            norm=TwoSlopeNorm(0, -least, most),
+        )
+        ax.set_title(_name_state(maps, k), loc="right", fontsize=8)
+        ax.set(xlim=np.array(window) * side, ylim=np.array(window) * side)
+        ax.set_facecolor("0.8")
+        _record_pressures(ax, cells / factor, side, Name(_branch(maps, k), labels))
+    for ax in panels[-columns:]:
+        ax.set_xlabel(f"$x$ ({length_unit})")
+    for ax in panels[::columns]:
+        ax.set_ylabel(f"$y$ ({length_unit})")
+    bar = fig.colorbar(image, ax=panels, shrink=0.9, pad=0.015, aspect=28, extend="both")
+    bar.set_label(f"pressure ({unit})")
+    ends = (-least, -least / 2, 0, most / 2, most)
+    bar.set_ticks(ends, labels=[format_number(float(f"{value:.2g}")) for value in ends])
+    fig.suptitle(run_label(campaign, labels), fontsize="medium")
+    return fig
+
+
+def _touched_region(touched, free):
+    """Return the lower and the upper limit of both axes, divided by the side; on a periodic surface, 0 and 1."""
+    if not free:
+        return 0.0, 1.0
+    places = np.flatnonzero(touched.any(axis=0) | touched.any(axis=1)) / len(touched)
+    room = _MARGIN * (np.ptp(places) or 1.0)
+    return max(places[0] - room, 0.0), min(places[-1] + room, 1.0)
+
+
+def _record_pressures(ax, cells, side, name):
+    """Record the pressures (Pa) of cells in contact, at most `_TABLE_CELLS` along a side."""
+    every = -(-len(cells) // _TABLE_CELLS)
+    row, column = np.nonzero(np.isfinite(cells[::every, ::every]))
+    x, y = (every * place * side / len(cells) for place in (column, row))
+    record(ax, x, y, name, pressure=cells[::every, ::every][row, column])
+
+
+def _branch(maps, snapshot):
+    """Return the branch of a snapshot, or pull-off."""
+    pull_off = str(maps["snapshot_kind"].values[snapshot]) == "pull_off"
+    return "pull-off" if pull_off else str(maps["branch"].values[int(maps["snapshot_step"].values[snapshot])])
+
+
+def _name_state(maps, snapshot):
+    """Return load and area of a snapshot as text, with the branch if it is not loading; on a free square, the force."""
+    step, name = int(maps["snapshot_step"].values[snapshot]), _branch(maps, snapshot)
+    if "force" in maps:
+        force = format_quantity(float(f"{float(maps['force'][step]):.3g}"), "N").replace("-", "−")
+        return f"{name}, $F$ = {force}"
+    load = format_number(float(f"{float(maps['reduced_pressure'][step]):.3g}"))
+    area = format_number(float(f"{float(maps['contact_area_fraction'][step]):.2g}"))
+    words = rf"$p^{{\ast}}$ = {load}" + f"\n$A/A_0$ = {area}"
+    return words if name == "loading" else f"{name}, {words}"

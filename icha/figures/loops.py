@@ -1,0 +1,426 @@
+"""Figures of loading and unloading: loops of rough contact (13), force of indenters (17), straight line of JKR (18)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from icha.contact.model import EVENT_KINDS
+from icha.contact.models import MODELS, REFERENCE_MODEL
+from icha.datasets.labels import RunLabels
+from icha.datasets.quantities import label_of, symbol_of
+from icha.figures import select
+from icha.figures.captions import (
+    attractions_of,
+    grid_of_loops,
+    only_spheres,
+    range_of_attraction,
+    without_fit,
+)
+from icha.figures.curves import Panel
+from icha.figures.drawn import Name, plot, record, say
+from icha.figures.indenter_curves import select_series, theory_curves
+from icha.figures.looks import (
+    BRANCH_DASHES,
+    MODEL_MARKERS,
+    REFERENCE_NAME,
+    UNLOADING_MARKERS,
+    Looks,
+    legend_below,
+    pale,
+    surface_label,
+)
+from icha.figures.style import (
+    BLACK,
+    GREY,
+    format_number,
+    in_style,
+    legend_handle,
+    new_grid,
+    new_panels,
+    slope_label,
+)
+from icha.support.formatting import choose_unit, format_quantity
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+# --- figure 13 ---
+
+# All slopes share a panel if there are at most this number of loops.
+_MOST_LOOPS = 4
+# A panel enlarges the tension if the largest tension is smaller than the largest pressure times this factor.
+_SMALL_TENSION = 0.25
+# Largest pressure in this panel, divided by the largest tension.
+_REACH = 1.4
+# Distance between the markers of boundary elements, divided by the diagonal of the panel.
+_APART = 0.025
+# Loading is a pale, wide line, so that it is visible where unloading coincides with it.
+_BRANCHES = {"loading": {"lw": 2.6, "alpha": 0.4}, "unloading": {"lw": 0.9}}
+# Number of points that are drawn for each step of the path.
+_POINTS_BETWEEN = 8
+_PULL_OFF = {"ls": "none", "mec": "black", "mew": 0.7, "ms": 4.6, "zorder": 6}
+_TRUTH = {"ls": "none", "ms": 3.6, "mew": 0.7, "zorder": 5}
+_TRUTH_MARKERS = {"loading": MODEL_MARKERS, "unloading": UNLOADING_MARKERS}
+_TRUTH_WORDS = {
+    REFERENCE_NAME: """Crosses are boundary elements on the same topography, upright in loading and oblique in
+    unloading.""",
+    select.FINITE_RANGE_NAME: "Crosses with three arms are boundary elements at a finite range of attraction.",
+}
+
+
+class _Loop(NamedTuple):
+    """A run in loading and unloading.
+
+    Attributes
+    ----------
+    labels : labels of the run.
+    run : the run.
+    truths : runs with boundary elements on the same topography, with the same material.
+    look : arguments of `Axes.plot` for lines and markers.
+    """
+
+    labels: RunLabels
+    run: xr.Dataset
+    truths: list[xr.Dataset]
+    look: dict
+
+
+@in_style
+def loops(
+    campaign: xr.DataTree,
+    *,
+    study: str,
+    boundary_elements: str | None = None,
+    surface: str | None = None,
+    seed: int | None = None,
+    units: str = "reduced",
+) -> Figure:
+    """Draw the runs of all slopes and materials of a study on one topography.
+
+    Parameters
+    ----------
+    campaign : the campaign dataset.
+    surface, seed : labels of the topography. Default: surface and seed of the first complete run.
+    units : "reduced" or "physical".
+    """
+    from matplotlib.ticker import MaxNLocator
+
+    from icha.analysis.model_error import difference_of_contacts
+
+    runs = select.select_by_labels(select.select_unloaded_runs(campaign, study), surface=surface, seed=seed)
+    others = select.select_runs(campaign, boundary_elements or study, ragged=False, model=REFERENCE_MODEL)
+    shown = {labels for labels, _ in runs}
+    truths = [run for labels, run in others if labels not in shown and select.unloading_legs(run)]
+    slopes = sorted({labels.rms_slope for labels, _ in runs}, reverse=True)
+    own_rows = len(runs) > _MOST_LOOPS and 1 < len(slopes) < len(runs)
+    # Slopes that have their own panels need no markers.
+    contacts = [(labels.material, labels.surface, None if own_rows else labels.rms_slope) for labels, _ in runs]
+    looks, drawn = Looks(campaign, [study], contacts, by_place=None), []
+    for (labels, run), contact in zip(runs, contacts, strict=True):
+        look = looks.look(contact, applicable=select.is_good_loop(run), model=labels.model)
+        beside = map(select.over_mean_separation, truths)
+        drawn.append(_Loop(labels, run, [each for each in beside if not difference_of_contacts(run, each)], look))
+
+    physical = units == "physical"
+    pressures, areas = _panels(campaign[study].to_dataset(), physical=physical)
+    rows = [[slope] for slope in slopes] if own_rows else [slopes]
+    by_row = [[loop for loop in drawn if loop.labels.rms_slope in shown] for shown in rows]
+    windows = [_small_tensions(loops_of_row, pressures) for loops_of_row in by_row]
+    columns = 3 if any(windows) else 2
+    fig, panels = new_panels(2.7 * len(rows), len(rows), columns)
+    load = "nominal pressure" if physical else "reduced pressure"
+    against = "mean separation" if physical else "mean separation divided by the rms height"
+    unit = "" if physical else ", multiplied by E* h'rms hrms,"
+    say(
+        fig,
+        f"""Loading (wide lines) and unloading (dashed lines) on one topography, which the title names: the
+        {load}{"" if physical else " F/(E* h'rms A0)"} against the {against} (left), and the contact area divided by the
+        nominal area against the {load} (right).""",
+        "The middle panel enlarges the region around zero load of the left panel." if columns > 2 else "",
+        """Where both lines coincide, contact is reversible. Tension is negative. Sudden changes along a line are jumps
+        of one or several spots. A straight line joins the states before and after a jump, as at both ends of a path,
+        where the load is zero because there is no contact.""",
+        f"The area between loading and unloading on the left{unit} is the energy lost per nominal area.",
+    )
+    for (left, *middle, right), shown_loops, window in zip(panels, by_row, windows, strict=True):
+        for ax, panel in ((left, pressures), *((ax, pressures) for ax in middle), (right, areas)):
+            for loop in shown_loops:
+                _draw(ax, loop, panel, turn=len(slopes) > 1)
+            panel.label(ax)
+            if ax not in panels[-1]:
+                ax.set_xlabel("")
+        for ax in middle:
+            ax.axhline(0, color=GREY, lw=0.5, zorder=1)
+            ax.xaxis.set_major_locator(MaxNLocator(4))
+            ax.text(0.95, 0.9, "near zero load", transform=ax.transAxes, ha="right", fontsize=8)
+            if window:
+                ax.set(xlim=window[0], ylim=window[1])
+            ax.yaxis.set_major_formatter(lambda value, _: format_number(value))
+            ax.set_ylabel(symbol_of(pressures.y) + (f" ({pressures.units[1]})" if physical else ""))
+        if own_rows:
+            right.set_title(slope_label(shown_loops[0].labels.rms_slope), loc="right")
+    labels, _ = runs[0]
+    models = dict.fromkeys([labels.model, *(REFERENCE_MODEL for loop in drawn if loop.truths)])
+    title = " and ".join(MODELS[model].words for model in models)
+    words = title, surface_label(campaign, labels.surface), f"seed {labels.seed}"
+    fig.suptitle(", ".join(words), fontsize="medium")
+    shown = [run for loop in drawn for run in (loop.run, *loop.truths)]
+    studies = list(dict.fromkeys(filter(None, (study, boundary_elements))))
+    say(fig, range_of_attraction(attractions_of(shown)), grid_of_loops(campaign, studies))
+    legend_below(fig, _handles(looks, drawn, marked=len(rows[0]) > 1), looks.heading())
+    return fig
+
+
+def _panels(dataset, *, physical):
+    """Return panels of load against separation, and of area against load."""
+    if not physical:
+        return Panel("reduced_separation", "reduced_pressure"), Panel("reduced_pressure", "contact_area_fraction")
+    (per_metre, length), (per_pascal, pressure) = (
+        choose_unit(float(np.abs(dataset[name]).max()), unit)
+        for name, unit in (("mean_separation", "m"), ("nominal_pressure", "Pa"))
+    )
+    loads = Panel("mean_separation", "nominal_pressure", (per_metre, per_pascal), (length, pressure))
+    return loads, Panel("nominal_pressure", "contact_area_fraction", (per_pascal, 1.0), (pressure, ""))
+
+
+def _draw(ax, loop, panel, *, turn):
+    """Draw a loop with a marker at pull-off; if `turn` is True, also mark the end of the first loading."""
+    run, colour, words = loop.run, loop.look["color"], select.name_of_model(loop.run)
+    for branch, leg in select.branches(run):
+        record(ax, *panel.points(leg), Name(f"{words}, {branch}", loop.labels))
+        line = panel.points(leg) if panel.y == "contact_area_fraction" else _curve(leg, panel)
+        ax.plot(*line, ls=BRANCH_DASHES[branch], color=colour, **_BRANCHES[branch])
+    marked = [(np.flatnonzero(run["leg"] == 0)[-1], {"ls": "none", "zorder": 5})] if turn else []
+    if turn:
+        say(ax, "Symbols without an edge mark the end of the first loading.")
+    if (at := select.pull_off_step(run)) is not None:
+        say(ax, "Symbols with a black edge mark pull-off, the largest tension in the last unloading.")
+        marked.append((at, _PULL_OFF))
+    for step, look in marked:
+        ax.plot(*(values[step] for values in panel.points(run)), **loop.look | look)
+    for truth in loop.truths:
+        name = select.name_of_model(truth)
+        say(ax, _TRUTH_WORDS[name])
+        for branch, markers in _TRUTH_MARKERS.items():
+            states = truth.isel(step=truth["branch"].values == branch)
+            look = {"color": colour, "marker": markers[name], **_TRUTH}
+            # The colour is already pale if the asperity model is not applicable.
+            look = look if select.is_good_loop(truth) or "label" in loop.look else pale(look, REFERENCE_MODEL)
+            of_truth = Name(f"{name}, {branch}", loop.labels._replace(model=REFERENCE_MODEL))
+            plot(ax, *panel.points(states), of_truth, markevery=_APART, **look)
+
+
+def _curve(leg, panel):
+    """Return separations and loads along a leg: cubic between two states, or straight if an event lies between them."""
+    separation, load = panel.points(leg)
+    # The stiffness in the units of the axes.
+    unit = panel.factors[0] / panel.factors[1]
+    if panel.y == "reduced_pressure":
+        unit *= float(leg["contact_modulus"] * leg["unit_slope"] / leg["unit_height"])
+    slope = -leg["contact_stiffness"].values / unit
+    width, change = np.diff(separation)[:, None], np.diff(load)[:, None]
+    t = np.linspace(0, 1, _POINTS_BETWEEN, endpoint=False)
+    with np.errstate(invalid="ignore"):  # the slope may be infinite, just before a jump and in full contact
+        # Slopes relative to the chord determine how far the cubic polynomial is from the chord.
+        start, end = (width * each[:, None] - change for each in (slope[:-1], slope[1:]))
+        bulge = t * (1 - t) * ((1 - t) * start - t * end)
+    smooth = np.all([np.diff(leg[f"{kind}_count"].values) == 0 for kind in EVENT_KINDS], axis=0)[:, None]
+    # A cubic polynomial that leaves the range of both loads by as much as they differ would not be the curve.
+    bulge = np.where(smooth & (np.abs(bulge) <= np.abs(change)).all(axis=1, keepdims=True), bulge, 0.0)
+    separations, loads = separation[:-1, None] + width * t, load[:-1, None] + change * t + bulge
+    return np.append(separations, separation[-1]), np.append(loads, load[-1])
+
+
+def _small_tensions(drawn, panel):
+    """Return the limits of separation and load around zero load, if the tension is small but not zero; else None."""
+    points = [panel.points(loop.run) for loop in drawn]
+    pressures = np.concatenate([load for _, load in points])
+    tension = -pressures.min()
+    if not select.ROUNDING * pressures.max() < tension < _SMALL_TENSION * pressures.max():
+        return None
+    shown = []
+    for loop, (separation, load) in zip(drawn, points, strict=True):
+        near = (np.abs(load) <= _REACH * tension) & (loop.run["contact_area_fraction"].values > 0)
+        at = np.flatnonzero(near)
+        # The first state after separation is shown as well.
+        shown.append(separation[np.unique([*at, min(at[-1] + 1, len(near) - 1)])] if at.size else [])
+    return _limits(np.concatenate(shown)), (-_REACH * tension, _REACH * tension)
+
+
+# Space around the states of the runs, divided by their range.
+_MARGIN = 0.06
+
+
+def _limits(values):
+    """Return the limits of an axis around some values."""
+    room = _MARGIN * np.ptp(values)
+    return float(values.min() - room), float(values.max() + room)
+
+
+def _handles(looks, loops, *, marked):
+    """Return the legend entries by name; `marked` is True if markers distinguish the loops."""
+    handles = looks.handles(lw=4, ls="-", **({} if marked else {"marker": "none"}))
+    for branch, dashes in BRANCH_DASHES.items():
+        handles[branch] = legend_handle(color=GREY, ls=dashes, **_BRANCHES[branch])
+    if any(select.pull_off_step(loop.run) is not None for loop in loops):
+        handles["pull-off"] = legend_handle(marker="o", mfc=GREY, **_PULL_OFF)
+    for name in dict.fromkeys(select.name_of_model(truth) for loop in loops for truth in loop.truths):
+        for branch, markers in _TRUTH_MARKERS.items():
+            handles[f"{name}, {branch}"] = legend_handle(color=GREY, marker=markers[name], **_TRUTH)
+    return handles
+
+
+# --- figure 17 ---
+
+# Largest number of series in a panel.
+_MOST_SERIES = 3
+_LOOP = {"lw": 0.9, "alpha": 0.85}
+_THEORIES = {"JKR": {"color": GREY, "lw": 2.4, "alpha": 0.45}, "Hertz": {"color": GREY, "lw": 0.9, "ls": ":"}}
+_THEORY_WORDS = {
+    "Hertz": """The dotted line is the theory of Hertz for a smooth sphere with the radius and the modulus of the runs
+    in the same panel.""",
+    "JKR": """The wide grey line is the theory of Johnson, Kendall and Roberts (JKR) for this sphere with the work of
+    adhesion of these runs, with the states that are unstable under load control, from the pull-off force to the
+    jump-off under displacement control.""",
+}
+
+
+@in_style
+def force_indentation(campaign: xr.DataTree, *, study: str) -> Figure:
+    """Draw force against indentation for all runs of a study, with the theories for each radius and material.
+
+    Series have a panel each if they are many, or if they differ in more than the rms height.
+    """
+    series = select_series(campaign, study)
+    runs = [run for each in series for run in each.runs.by_seed.values()]
+    names = "indentation", "force"
+    (per_metre, length), (per_newton, newton) = (
+        choose_unit(max(float(np.abs(run[name]).max()) for run in runs), unit)
+        for name, unit in (("indentation", "m"), ("force", "N"))
+    )
+    panel = Panel(*names, (per_metre, per_newton), (length, newton))
+    limits = [_limits(values) for values in map(np.concatenate, zip(*map(panel.points, runs), strict=True))]
+    by_height = not any(each.contact for each in series)
+    together = len(series) <= _MOST_SERIES and by_height
+    shown = [series] if together else [[each] for each in series]
+    fig, panels, columns = new_grid(len(shown), 2, 2.7, 3.55, least=1.3, sharex=True, sharey=True)
+    say(
+        fig,
+        """Force against indentation in loading (solid lines) and unloading (dashed lines). The indentation is the
+        distance by which the apex of the shape without roughness has moved beyond the undeformed plane of the elastic
+        body. Tension is negative. Every seed is a line of its own.""",
+        """Colours become brighter with the rms height of the roughness; runs without roughness are black."""
+        if by_height
+        else "",
+    )
+    largest = max(float(run["contact_radius"].max()) for run in runs)
+    theories = {}
+    for ax, of_panel in zip(panels, shown, strict=True):
+        of_sphere = theory_curves(of_panel[0].first_run, 1.5 * largest)
+        theories |= of_sphere
+        for name, states in of_sphere.items():
+            plot(ax, *panel.points(dict(zip(names, states, strict=True))), name, zorder=1, **_THEORIES[name])
+        for each in of_panel:
+            for seed, run in each.runs.by_seed.items():
+                for branch, leg in select.branches(run):
+                    name = Name(branch, each.runs.labels._replace(seed=seed))
+                    plot(ax, *panel.points(leg), name, color=each.colour, ls=BRANCH_DASHES[branch], **_LOOP)
+        ax.axhline(0, color=GREY, lw=0.5, zorder=0)
+        if len(shown) > 1:
+            ax.set_title(of_panel[0].name, loc="right")
+        ax.set(xlim=limits[0], ylim=limits[1])
+    for ax in panels[-columns:]:
+        ax.set_xlabel(label_of(panel.x, panel.units[0]))
+    for ax in panels[::columns]:
+        ax.set_ylabel(label_of(panel.y, panel.units[1]))
+    say(fig, *(_THEORY_WORDS[name] for name in ("Hertz", "JKR") if name in theories))
+    dataset = campaign[study].to_dataset()
+    if "JKR" in theories and (dataset["surface_energy"] == 0).any():
+        say(fig, "Runs without adhesion have no line of JKR.")
+    if theories and select.lacks_sphere(dataset):
+        say(fig, "Shapes without a radius and layers have neither line.")
+    named = [] if len(shown) > 1 else series
+    handles = {each.name: legend_handle(color=each.colour, **_LOOP) for each in named}
+    handles |= {name: legend_handle(color=BLACK, ls=dashes, **_LOOP) for name, dashes in BRANCH_DASHES.items()}
+    handles |= {f"{name}, smooth sphere": legend_handle(**_THEORIES[name]) for name in theories}
+    legend_below(fig, handles)
+    return fig
+
+
+# --- figure 18 ---
+
+# Variables of the works of adhesion; title of the panel and marker of the states.
+_TITLES = {"approach": ("loading", "o"), "retraction": ("unloading", "s")}
+_STATES = {"ls": "none", "ms": 2.8, "mew": 0.6, "mfc": "white"}
+_FIT = {"lw": 0.9, "ls": "-"}
+
+_LINE = """Linearised plot of the equation of Johnson, Kendall and Roberts (JKR), for the first loading (a) and the last
+unloading up to the largest tension (b). Here F is the force, R the radius of the smooth sphere, and a the radius of a
+circle with the true contact area. A smooth sphere with a Tabor parameter of 3 or more gives a straight line of slope
+3/(4 E*), and the work of adhesion w follows from the value at F = 0, 3 sqrt(8 π E* w)/(4 E*). Markers are states of all
+seeds, at most one hundred of each run at equal steps of the indentation. States with F/a^(3/2) below -sqrt(8 π E* Δγ),
+where no sphere of JKR has contact, are not shown. Lines are fits of JKR with the given E* and R, one for each seed. A
+fit minimises the squared differences of a³ at given F, so states with a large radius have most weight. The legend gives
+the means over the seeds of the fitted work of adhesion."""
+
+
+@in_style
+def jkr_plot(campaign: xr.DataTree, *, study: str) -> Figure:
+    """Draw a^(3/2)/R against F/a^(3/2) for loading and unloading, with the fitted JKR lines.
+
+    The equation of JKR, F = 4 E* a^3/(3 R) - sqrt(8 pi E* w a^3), is the straight line y = 3 (x + sqrt(8 pi E* w))/(4
+    E*) with x = F/a^(3/2) and y = a^(3/2)/R. Runs without adhesion, without a radius R, and on a layer are left out.
+    """
+    from icha.references.indenter_runs import BRANCHES, spaced_states, steps_of
+
+    series = select_series(campaign, study, only_jkr=True)
+    drawn = []
+    for each in series:
+        for seed, run in each.runs.by_seed.items():
+            labels = each.runs.labels._replace(seed=seed)
+            for branch, choose in BRANCHES.items():
+                states = choose(steps_of(run))
+                chosen = [states[k] for k in spaced_states([state["indentation"] for state in states])]
+                force, radius = (np.array([state[name] for state in chosen]) for name in ("force", "contact_radius"))
+                x, y = force / radius**1.5, radius**1.5 / float(run["shape_radius"])
+                # The line of JKR is zero here. States beyond it, of little contact area, would hide the others.
+                inside = x > -np.sqrt(8 * np.pi * float(run["contact_modulus"] * run["surface_energy"]))
+                drawn.append((branch, each, labels, run, x[inside], y[inside]))
+    scale, unit = choose_unit(max(float(np.abs(x).max(initial=0.0)) for *_, x, _ in drawn), "N")
+    fig, [panels] = new_panels(3.0, sharex=True, sharey=True)
+    dataset = campaign[study].to_dataset()
+    say(fig, _LINE, without_fit(dataset), only_spheres(dataset))
+    for branch, each, labels, run, x, y in drawn:
+        ax = panels[list(_TITLES).index(branch)]
+        plot(ax, x * scale, y * 1e3, Name("states", labels), marker=_TITLES[branch][1], mec=each.colour, **_STATES)
+        if (name := f"work_of_adhesion_{branch}") in run:
+            modulus = float(run["contact_modulus"])
+            line = 0.75 / modulus * (x + np.sqrt(8 * np.pi * modulus * float(run[name])))
+            plot(ax, x * scale, line * 1e3, Name("fit of JKR", labels), color=each.colour, **_FIT)
+    for ax, (name, _) in zip(panels, _TITLES.values(), strict=True):
+        ax.set_title(name, loc="right")
+        ax.set(xlabel=rf"$F/a^{{3/2}}$  ({unit} m$^{{-3/2}}$)", ylabel=r"$a^{3/2}/R$  ($10^{-3}$ m$^{1/2}$)")
+        ax.label_outer()
+    handles = {f"{each.name}: {_works(each)}": legend_handle(color=each.colour, **_FIT) for each in series}
+    states = {"states": legend_handle(marker="o", mec=GREY, **_STATES), "fit of JKR": legend_handle(color=GREY, **_FIT)}
+    legend_below(fig, handles | states)
+    return fig
+
+
+def _works(series):
+    """Return the mean fitted works of adhesion of a series as text, or why there are none."""
+    from icha.references.indenter_runs import reason_without_fit
+
+    words, runs = [], list(series.runs.by_seed.values())
+    for branch, (title, _) in _TITLES.items():
+        name = f"work_of_adhesion_{branch}"
+        values = [float(run[name]) for run in runs if name in run]
+        if values:
+            fewer = f" ({len(values)} of {len(runs)} seeds)" if len(values) < len(runs) else ""
+            words.append(f"{title} {format_quantity(float(f'{np.mean(values):.3g}'), 'J/m²')}{fewer}")
+        else:
+            words.append(f"{title} no fit ({reason_without_fit(runs[0], branch)})")
+    return ", ".join(words)
