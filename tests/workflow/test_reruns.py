@@ -85,7 +85,7 @@ def test_comments_docstrings_formatting_and_touch_run_nothing_nor_does_a_fresh_c
         ("icha/asperity/jkr.py", {"run", "compute_theories", *AFTER_RUNS}, 27 + 2),
         ("icha/surfaces/spectrum.py", {"make_surfaces", "run", "compute_theories", *AFTER_RUNS}, 3 + 27 + 2),
         ("icha/analysis/estimates.py", AFTER_RUNS, 0),
-        ("icha/figures/fig13_loops.py", {"draw_figures", "report_page"}, 0),
+        ("icha/figures/loops.py", {"draw_figures", "report_page"}, 0),
     ],
 )
 def test_a_new_statement_computes_again_what_its_module_computes(path, rules, outdated, own, edit):
