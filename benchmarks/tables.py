@@ -32,11 +32,6 @@ def select(results, prefix, **wanted) -> list[dict]:
     ]
 
 
-def grids(results) -> list[int]:
-    """Return the grids of the sweeps."""
-    return sorted({result["grid"] for result in select(results, "sweep-")})
-
-
 def seconds(value: float) -> str:
     return f"{value:.2f} s" if value < 10 else f"{value:.0f} s"
 
@@ -91,18 +86,20 @@ def differences(results, result) -> list[str]:
     return [spread("area_fraction"), f"gap {np.median(gap):+.3f} ({gap.min():+.3f} to {gap.max():+.3f}) h_rms"]
 
 
-def sweep(results, grid, adhesion) -> Table:
-    """Table with a row per code, ICHA first; a code that was stopped at its limit has lower bounds."""
+def sweep(results, adhesion) -> Table:
+    """Table with a row per grid and code, ICHA first; a code that was stopped at its limit has lower bounds."""
     rows = []
-    order = sorted(
-        select(results, "sweep-", grid=grid, adhesion=adhesion),
-        key=lambda r: (r["code"] != "icha", r["code"] not in OWN, r["control"] != "load", r["code"], r["threads"]),
-    )
-    for result in order:
+
+    def order(run):
+        own = run["code"] != "icha", run["code"] not in OWN
+        return run["grid"], *own, run["control"] != "load", run["code"], run["threads"]
+
+    for result in sorted(select(results, "sweep-", adhesion=adhesion), key=order):
+        grid = f"{result['grid']}²"
         name = result["code"] + (", given gaps" if result["control"] == "gap" else "")
         name += f", {result['threads']} threads" if result["threads"] > 1 else ""
         if not result.get("stops"):
-            rows.append([name, f"{result['outcome']}: {result['last_words']}", *[""] * 8])
+            rows.append([grid, name, f"{result['outcome']}: {result['last_words']}", *[""] * 8])
             continue
         more = "> " if result["outcome"] == "over time" else ""
         compute = f"{len(result['stops'])} stops in " if more else ""
@@ -117,8 +114,8 @@ def sweep(results, grid, adhesion) -> Table:
             ]
         spent = [more + seconds(result["wall"]), more + seconds(result["processor"])]
         spent += [compute + seconds(computation(result)), f"{result['peak'] / 2**20:.0f} MiB"]
-        rows.append([name, *spent, *ratios])
-    head = ["code", "wall", "processor", "computation", "memory", "time / ICHA's", "computation / ICHA's"]
+        rows.append([grid, name, *spent, *ratios])
+    head = ["grid", "code", "wall", "processor", "computation", "memory", "time / ICHA's", "computation / ICHA's"]
     return Table([*head, "memory / ICHA's", "ICHA's area", "and gap or load"], rows, numbers=True)
 
 
@@ -143,7 +140,8 @@ def draw_sweep(results, path: Path) -> None:
             )
         axis.set_title(WITH[adhesion])
         axis.set_xlabel("nodes along a side")
-        axis.set_xticks(grids(results), [str(grid) for grid in grids(results)], minor=False)
+        grids = sorted({run["grid"] for run in runs})
+        axis.set_xticks(grids, [str(grid) for grid in grids], minor=False)
         axis.set_xticks([], minor=True)
         axis.grid(alpha=0.3)
     figure.legend(lines.values(), lines.keys(), loc="outside lower center", ncols=4, fontsize=8)
@@ -153,9 +151,7 @@ def draw_sweep(results, path: Path) -> None:
 
 def tables(results) -> dict[str, Table]:
     """Return all tables of the page."""
-    found = {"surfaces": surfaces(results)}
-    for grid in grids(results):
-        found |= {f"{grid}_{'adhesive' if energy else 'bare'}": sweep(results, grid, energy) for energy in WITH}
+    found = {"surfaces": surfaces(results), "bare": sweep(results, False), "adhesive": sweep(results, True)}
     return {f"benchmarks_{name}": table for name, table in found.items()}
 
 
