@@ -83,6 +83,12 @@ def distances(errors: xr.Dataset) -> Table:
     return Table(["surface", "", *pressures(errors["reduced_pressure"].values)], rows)
 
 
+def both(bare: Table, adhesive: Table) -> Table:
+    """Join the tables without and with adhesion, which have the same columns."""
+    rows = [[name, *row] for name, table in (("without", bare), ("with", adhesive)) for row in table.rows]
+    return Table(["adhesion", *bare.head], rows)
+
+
 def range_and_limit(short_range: xr.Dataset, finite_range: xr.Dataset) -> Table:
     """Table of errors of the contact area with adhesion in per cent, at a finite range and in the limit of short range.
 
@@ -161,12 +167,9 @@ def tables(entries: Mapping[str, xr.Dataset], campaign: xr.DataTree) -> dict[str
     }
     found = {
         "summary": summary(covered),
-        "area_bare": errors_by_load(bare, "area_error"),
-        "separation_bare": errors_by_load(bare, "separation_error"),
-        "area_adhesive": errors_by_load(adhesive, "area_error"),
-        "separation_adhesive": errors_by_load(adhesive, "separation_error"),
-        "distributions_bare": distances(bare),
-        "distributions_adhesive": distances(adhesive),
+        "area": both(errors_by_load(bare, "area_error"), errors_by_load(adhesive, "area_error")),
+        "separation": both(errors_by_load(bare, "separation_error"), errors_by_load(adhesive, "separation_error")),
+        "distributions": both(distances(bare), distances(adhesive)),
         "range_and_limit": range_and_limit(adhesive, entries["finite_range"]),
         "ranges": effect_of_range(entries["ranges"]),
         "both_ways": loops_of_both_models(campaign, "small"),
