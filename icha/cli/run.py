@@ -179,6 +179,9 @@ def _compute(command: list[str], workflow: Path, campaign, results: Path, target
     for name, file in files.items() if count or not status else ():  # otherwise the files are from an earlier call
         if (results / file).exists():
             echo(f"{name + ':':<9}{shorten_path(results / file)}")
+    drawn = {file.stem for file in (results / "figures").glob("*.png")}
+    if others := sorted(drawn - campaign.figures.by_name().keys()):
+        echo(f"not in the configuration, remove their files if they are not needed: figures {', '.join(others)}")
     if status:
         echo(f"log:     {shorten_path(log)}")
     if status and (stopped or failed != ["verdict.log"]):

@@ -105,12 +105,17 @@ def test_a_run_that_fails_leaves_a_dataset_and_is_listed_with_its_reason(project
     (project / "config/campaigns/far.yaml").write_text(yaml.safe_dump(far))
     output = run(project, "dataset", campaign="far", status=1)
     assert "2 runs failed; all reasons: results/far/logs/failed_runs.txt" in output
+    assert "not in the configuration" not in output
     assert "\n    load/rough/seed1/slope1/bare: nothing was computed: path: " in output and " (2 seeds)\n" in output
     assert "1 job failed:" in output and "logs/verdict.log" in output
     assert "dataset: results/far/dataset/far.nc" in output
     assert re.search(r"^far: 8 files to compute, about .* on 2 cores", output, re.MULTILINE)
     # A second call repeats the verdict only.
-    assert "Nothing to do" in run(project, "runs", campaign="far")
+    (project / "results/far/figures").mkdir()
+    (project / "results/far/figures/fig7_stiffness.png").touch()
+    output = run(project, "runs", campaign="far")
+    assert "Nothing to do" in output
+    assert "not in the configuration, remove their files if they are not needed: figures fig7_stiffness" in output
 
 
 @pytest.mark.slow

@@ -286,7 +286,7 @@ def test_fig15_parts_are_of_either_sign_and_make_up_the_whole(tree):
     parts = {"loss_by_jump_in": 3.0, "loss_by_jump_off": 1.0, "loss_by_coalescence": -1.0, "loss_unattributed": 0.0}
     line = [{1: run.assign(parts), 2: run.assign(parts)}, {1: run.assign(largest_reduced_pressure=-1.0)}]
     found = shares([ContactRuns(None, runs, 2, True) for runs in line])
-    assert list(found.values()) == pytest.approx([0.6, 0.2, -0.2, 0, 0])
+    assert list(found.values()) == pytest.approx([0.6, 0.2, -0.2, 0, 0, 0])
     figure = against_parameter.loss(one(**parts), studies=["one"])
     heights = sorted((bar.get_y(), bar.get_y() + bar.get_height()) for bar in figure.axes[1].patches)
     np.testing.assert_allclose(heights, [(0, -20), (0, 60), (60, 80)])

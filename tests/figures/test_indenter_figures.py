@@ -16,7 +16,7 @@ from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of
 from icha.figures import against_load, against_parameter, at_one_load, contact_maps, loops, select
 from icha.figures.captions import units_of_shapes
-from icha.figures.drawn import caption_of
+from icha.figures.drawn import caption_of, table_of
 from icha.figures.indenter_curves import select_series
 from icha.surfaces.shapes import Cone, CylinderPunch, Sphere
 
@@ -191,7 +191,7 @@ def test_captions_state_the_units_of_shapes():
 def test_maps_show_the_pressure_at_every_snapshot():
     run = press()
     fig = contact_maps.pressure_maps(tree_of(run), run, run=("press", "boundary_elements", "s0", 0, 0.1, "soft"))
-    panels = [ax for ax in fig.axes if ax.get_images()]
+    panels, drawn = [ax for ax in fig.axes if ax.get_images()], table_of(fig)
     titles = [ax.get_title("right") for ax in panels]
     assert [title.split(",")[0] for title in titles] == ["loading", "pull-off"]
     for k, ax in enumerate(panels):
@@ -199,6 +199,10 @@ def test_maps_show_the_pressure_at_every_snapshot():
         force = run["force"].values[run["snapshot_step"].values[k]]
         unit = {"kPa": 1e3, "MPa": 1e6, "Pa": 1.0}[fig.axes[-1].get_ylabel().split("(")[1][:-1]]
         assert shown.sum() * unit * (SIDE / GRID) ** 2 == pytest.approx(force, rel=1e-4)
+        # The table has the pressure of every cell in contact, at its place.
+        cells = drawn[drawn.panel == "ab"[k]]
+        assert cells.pressure.sum() * (SIDE / GRID) ** 2 == pytest.approx(force, rel=1e-4)
+        assert cells.x.mean() == pytest.approx(cells.y.mean()) and len(cells) == shown.count()
 
 
 def test_reasons_for_an_empty_figure():
