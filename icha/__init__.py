@@ -9,6 +9,7 @@ _HOME = {
     **dict.fromkeys(("SpectrumTable", "merge_spectra", "read_spectrum_table"), "surfaces.tabulated_spectrum"),
     **dict.fromkeys(("Sphere", "Paraboloid", "CylinderPunch", "FlatPunch", "Cone", "Wave"), "surfaces.shapes"),
     "Material": "asperity.material",
+    **dict.fromkeys(("Patches", "Stripes"), "asperity.adhesion_map"),
     "Path": "path.targets",
     "read_scan": "configuration.topographies",
     "simulate": "simulation",
@@ -20,6 +21,8 @@ _HOME = {
 __all__ = ["__version__", *_HOME]
 
 if TYPE_CHECKING:  # for editors and type checkers only
+    from icha.asperity.adhesion_map import Patches as Patches
+    from icha.asperity.adhesion_map import Stripes as Stripes
     from icha.asperity.material import Material as Material
     from icha.configuration.topographies import read_scan as read_scan
     from icha.deposit.fetch import fetch_deposit as fetch_deposit

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from icha.asperity.adhesion_map import AdhesionMap, map_of
 from icha.support.formatting import format_quantity, html_table
 from icha.support.rules import ADHESION_LENGTH, CONTACT_MODULUS, LENGTH, POISSON_RATIO, SURFACE_ENERGY
 
@@ -26,7 +27,9 @@ class Material:
     contact_modulus : E*, composite elastic modulus, Pa, in [1e-9, 1e15].
     surface_energy : work of adhesion dgamma (gamma in the paper), J/m^2, at most 1e24; zero without adhesion.
         With adhesion, surface_energy/contact_modulus must be in [1e-40, 1e9] m. A pair gives the work of advancing and
-        that of receding fronts; the attribute is then the first, and `receding_energy` the second.
+        that of receding fronts; the attribute is then the first, and `receding_energy` the second. A `Stripes` or
+        `Patches`, or an array (n, n) on the nodes of the surface, gives the work at every place; the attribute is then
+        the mean, and `adhesion_map` the map. In a pair, the first may be a map; the second is then a mean.
     interaction_range : range of the attractive forces (epsilon in eq. 3 of Violano & Afferrante), m, in [1e-24, 1e9].
         Default: 0.5 nm, about the distance between molecules, as for van der Waals forces.
     flaw_radius : radius of the largest flaw of the interface, m, in [1e-24, 1e9]; 0 for an interface without flaws.
@@ -34,6 +37,7 @@ class Material:
     poisson_ratio : Poisson ratio of the layer, in [0, 0.5]; a half-space does not depend on it at a given E*.
     receding_energy : work of adhesion of receding fronts, J/m^2, larger than `surface_energy`; None for one value.
         Two equal values are one value.
+    adhesion_map : works of adhesion from place to place, relative to their mean; None for one work at every place.
 
     Raises
     ------
@@ -48,11 +52,16 @@ class Material:
     thickness: float = math.inf
     poisson_ratio: float = 0.5
     receding_energy: float | None = None
+    adhesion_map: AdhesionMap | None = None
 
     def __post_init__(self):
         """Check the values."""
         if isinstance(self.surface_energy, (tuple, list)):
             self._set_pair()
+        if (places := map_of(self.surface_energy)) is not None:
+            object.__setattr__(self, "surface_energy", places.mean)
+            object.__setattr__(self, "adhesion_map", places)
+        object.__setattr__(self, "adhesion_map", map_of(self.adhesion_map))
         if self.receding_energy == self.surface_energy:
             object.__setattr__(self, "receding_energy", None)
         rules = {"contact_modulus": CONTACT_MODULUS, "surface_energy": SURFACE_ENERGY, "interaction_range": LENGTH}
@@ -82,15 +91,17 @@ class Material:
         object.__setattr__(self, "receding_energy", receding)
         if not 0 < self.surface_energy < receding:
             raise ValueError(
-                f"surface_energy: the advancing value {self.surface_energy:g} J/m^2 must be positive, and smaller than "
-                f"the receding value {receding:g} J/m^2"
+                f"surface_energy: advancing {self.surface_energy:g} J/m^2, receding {receding:g} J/m^2; expected "
+                "0 < advancing <= receding"
             )
 
     def _repr_html_(self) -> str:
         """Return a table for notebooks."""
         rows = {
             "contact modulus": format_quantity(self.contact_modulus, "Pa"),
-            "work of adhesion": format_quantity(self.surface_energy, "J/m²"),
+            "mean work of adhesion" if self.adhesion_map else "work of adhesion": format_quantity(
+                self.surface_energy, "J/m²"
+            ),
             **({"receding": format_quantity(self.receding_energy, "J/m²")} if self.receding_energy else {}),
             "range of attraction": format_quantity(self.interaction_range, "m"),
         }
@@ -113,6 +124,16 @@ class Material:
         """The material with the work of adhesion of receding fronts for both directions."""
         receding = self.receding_energy
         return self if receding is None else replace(self, surface_energy=receding, receding_energy=None)
+
+    def adhesion_length_on(self, grid: int, side: float, *, periodic: bool) -> np.ndarray | float:
+        """Return the elasto-adhesive length at the nodes of a square, (n, n), m; a number without a map.
+
+        Raises `ValueError` if the map does not fit the square.
+        """
+        if self.adhesion_map is None:
+            return self.adhesion_length
+        values = self.adhesion_map.on_nodes(grid, side, periodic=periodic)
+        return self.adhesion_length * values / self.adhesion_map.mean
 
     @property
     def adhesion_length(self) -> float:

@@ -16,7 +16,7 @@ from icha.asperity.material import Material
 from icha.boundary_elements import minimise as solver
 from icha.boundary_elements.elastic import HalfSpace
 from icha.boundary_elements.full_contact import ROUNDING, FullContactProblem
-from icha.boundary_elements.laws import AtDistance, Cohesive, NoAttraction, ShortRange, average
+from icha.boundary_elements.laws import AtDistance, Cohesive, NoAttraction, ShortRange, at_cells, average
 from icha.boundary_elements.observables import PatchObservables
 from icha.boundary_elements.patches import (
     BEYOND_EDGES,
@@ -454,14 +454,19 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
     largest = float(np.abs(heights, where=np.isfinite(heights), out=np.zeros_like(heights)).max())
     attraction: AtDistance | ShortRange = NoAttraction()
     if material.surface_energy:
-        adhesion_length = material.adhesion_length / h
+        adhesion_length = material.adhesion_length_on(surface.grid, surface.period, periodic=not surface.free) / h
+        if np.ndim(adhesion_length):
+            margin = (0, space.grid - surface.grid)
+            adhesion_length = np.pad(adhesion_length, margin, constant_values=material.adhesion_length / h)
         ratio = material.receding.surface_energy / material.surface_energy
         if attraction_on(material, h) == FINITE_RANGE:
             strength = material.interface_strength / material.contact_modulus * ratio**0.5
             attraction = Cohesive(adhesion_length, strength, ratio)
         else:
             R, above = asperities.radius_of_curvature, asperities.height - heights.ravel()[cell]
-            jump_in = law.jump_in_approach(R)
+            # The jump-in distance depends on the product of the square of the work and the radius.
+            local = at_cells(adhesion_length * h / material.adhesion_length, cell)
+            jump_in = law.jump_in_approach(R * local**2)
             radius = law.contact_radius(jump_in, R)
             strength = material.receding.interface_strength / material.contact_modulus
             attraction = ShortRange(adhesion_length, strength, cell, above / h, -jump_in / h, radius / h, ratio)

@@ -14,6 +14,7 @@ from typing import Annotated, Any, NamedTuple
 
 from pydantic import AfterValidator, Field, PrivateAttr
 
+from icha.asperity.adhesion_map import map_of
 from icha.configuration.figures import Figures
 from icha.configuration.measurements import Measurement
 from icha.configuration.publication import Line, Prose, Publication
@@ -257,8 +258,9 @@ class Campaign(Section):
             if MODELS[label].by_summits and self.materials[name].thickness is not None:
                 reason = f"need a half-space, because their law is that of a half-space, but {name!r} is a layer"
                 yield ("models", index), label, f"{reason}; expected [boundary_elements], or no `thickness` in {name!r}"
-            if MODELS[label].by_summits and self.materials[name].receding_energy is not None:
-                reason = f"have one work of adhesion, but {name!r} has an advancing and a receding one"
+            material = self.materials[name]
+            if MODELS[label].by_summits and (material.receding_energy or material.adhesion_map):
+                reason = f"have one work of adhesion, but {name!r} has several, by direction or place"
                 yield ("models", index), label, f"{reason}; expected [boundary_elements]"
         for (index, label), name in itertools.product(enumerate(study.models), study.surfaces):
             if MODELS[label].by_summits and not self.is_flat(name):
@@ -266,6 +268,13 @@ class Campaign(Section):
                 yield ("models", index), label, f"{reason}; expected [boundary_elements]"
         for name, label in itertools.product(study.surfaces, study.materials):
             thickness, known = self.materials[label].thickness, self._grid_and_period(name)
+            if (places := self.materials[label].adhesion_map) and hasattr(known, "grid"):
+                try:
+                    field = map_of(places.model_dump(exclude_none=True))
+                    field.on_nodes(known.grid, known.period, periodic=not self.is_free(name))
+                except ValueError as error:
+                    reason = f"contains {label!r}, whose work of adhesion does not fit the surface {name!r}: {error}"
+                    yield ("materials",), study.materials, reason
             if thickness and self.is_free(name) and hasattr(known, "grid") and thickness < known.period / known.grid:
                 layer, cell = formatting.length(thickness), formatting.length(known.period / known.grid, 3)
                 reason = f"contains the layer {label!r} of {layer}, thinner than a grid cell of {name!r} ({cell})"

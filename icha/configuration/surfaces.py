@@ -14,6 +14,7 @@ from pydantic import (
     model_validator,
 )
 
+from icha.asperity.adhesion_map import MAPS, map_of
 from icha.asperity.material import VAN_DER_WAALS_RANGE
 from icha.configuration.shapes import ShapeSection
 from icha.support import formatting
@@ -26,6 +27,7 @@ from icha.support.values import (
     Modulus,
     OrSchema,
     Section,
+    Seed,
     SurfaceEnergy,
     Text,
     integer,
@@ -82,13 +84,61 @@ def _bodies_of(content: Mapping) -> Any:
     return [body | own if isinstance(body, Mapping) else body for body in bodies]
 
 
-# Works of adhesion by direction.
+class StripesSection(Section):
+    """Stripes of two works of adhesion."""
+
+    low: SurfaceEnergy
+    """Smaller work of adhesion; the stripe at the origin has it."""
+    high: SurfaceEnergy
+    """Larger work of adhesion."""
+    width: Length
+    """Width of each stripe; on a periodic surface, two widths fit into the period a whole number of times."""
+    along: Literal["x", "y"] = "x"
+    """Axis along which the stripes run."""
+
+
+class PatchesSection(Section):
+    """Random field of works of adhesion, whose logarithm is Gaussian."""
+
+    mean: SurfaceEnergy
+    """Mean work of adhesion."""
+    standard_deviation: SurfaceEnergy
+    """Standard deviation of the work of adhesion."""
+    correlation_length: Length
+    """Distance at which the correlation of the logarithm has fallen to 1/e: two grid cells to a quarter of the side."""
+    seed: Seed = 0
+    """Seed of the field; all runs with the material have the same field."""
+
+
+class AdhesionMapSection(Section):
+    """Works of adhesion from place to place: one of both keys. Only with `models: [boundary_elements]`."""
+
+    stripes: StripesSection | None = None
+    """Stripes of two works of adhesion."""
+    patches: PatchesSection | None = None
+    """Random patches."""
+
+    @property
+    def mean(self) -> float:
+        """Mean work of adhesion, J/m^2."""
+        return map_of(self.model_dump(exclude_none=True)).mean
+
+    @model_validator(mode="after")
+    def _check(self):
+        if (self.stripes is None) == (self.patches is None):
+            raise ValueError("expected one of the keys stripes and patches")
+        map_of(self.model_dump(exclude_none=True))
+        return self
+
+
+# Works of adhesion by direction and place.
+_MAP = {"type": "object", "minProperties": 1, "maxProperties": 1, "propertyNames": {"enum": list(MAPS)}}
 _DIRECTIONS = {
     "type": "object",
     "required": ["advancing", "receding"],
     "additionalProperties": False,
     "properties": {
-        "advancing": {"type": "string", "pattern": PATTERN, "examples": ["30 mJ/m^2"]},
+        "advancing": {"anyOf": [{"type": "string", "pattern": PATTERN, "examples": ["30 mJ/m^2"]}, _MAP]},
         "receding": {"type": "string", "pattern": PATTERN, "examples": ["90 mJ/m^2"]},
     },
 }
@@ -113,12 +163,16 @@ class MaterialSection(Section):
     )
     contact_modulus: Modulus
     """Composite elastic modulus E* (contact modulus). Required without `bodies` and `youngs_modulus`."""
-    surface_energy: Annotated[SurfaceEnergy, OrSchema(_DIRECTIONS)]
+    surface_energy: Annotated[SurfaceEnergy, OrSchema({"anyOf": [_DIRECTIONS, _MAP]})]
     """Work of adhesion Δγ. The value `0 J/m^2` means no adhesion. With `{advancing: 30 mJ/m^2, receding: 90 mJ/m^2}`,
-    the edge of a contact advances at a smaller work of adhesion than it recedes, and stands in between."""
+    the edge of a contact advances at a smaller work of adhesion than it recedes, and stands in between. With
+    `{stripes: …}` or `{patches: …}`, it differs from place to place: see `adhesion_map`. The advancing value may be
+    such a map; the receding one is then a mean."""
     receding_energy: SurfaceEnergy | None = None
     """Work of adhesion of a receding edge, for studies that vary it; `surface_energy` with two values sets it. Only
     with `models: [boundary_elements]`. Default: that of an advancing edge."""
+    adhesion_map: AdhesionMapSection | None = None
+    """Works of adhesion from place to place, relative to their mean; `surface_energy` with a map sets it."""
     interaction_range: Length = Field(default=f"{VAN_DER_WAALS_RANGE * 1e9:g} nm", validate_default=True)
     """Range ε of the attraction. The range determines when asperities jump into contact. Boundary elements have this
     range if the grid resolves it. The Tabor parameter is μ =
@@ -166,24 +220,36 @@ class MaterialSection(Section):
 
     @model_validator(mode="before")
     @classmethod
-    def _divide_directions(cls, content: Any) -> Any:
-        """Divide a work of adhesion by direction into two keys."""
+    def _divide_energy(cls, content: Any) -> Any:
+        """Divide a work of adhesion by direction and place into three keys."""
         energy = content.get("surface_energy") if isinstance(content, Mapping) else None
+        if isinstance(energy, Mapping) and set(energy) == {"advancing", "receding"}:
+            if content.get("receding_energy") is not None:
+                raise ValueError("receding_energy: is given beside surface_energy.receding; expected one of both")
+            content = {**content, "surface_energy": energy["advancing"], "receding_energy": energy["receding"]}
+            energy = energy["advancing"]
         if not isinstance(energy, Mapping):
             return content
-        if set(energy) != {"advancing", "receding"}:
+        if len(energy) != 1 or next(iter(energy)) not in MAPS:
             keys = ", ".join(map(str, energy)) or "no keys"
-            raise ValueError(f"surface_energy: has {keys}; expected one value, or the keys advancing and receding")
-        if content.get("receding_energy") is not None:
-            raise ValueError("receding_energy: is given beside surface_energy.receding; expected one of both")
-        return {**content, "surface_energy": energy["advancing"], "receding_energy": energy["receding"]}
+            raise ValueError(
+                f"surface_energy: has {keys}; expected one value, the keys advancing and receding, or one of the keys "
+                f"{' and '.join(MAPS)}"
+            )
+        if content.get("adhesion_map") is not None:
+            raise ValueError("adhesion_map: is given beside a map in surface_energy; expected one of both")
+        try:
+            mean = AdhesionMapSection.model_validate(energy).mean
+        except ValidationError:
+            mean = 1.0  # the map reports the problem
+        return {**content, "surface_energy": f"{mean!r} J/m^2", "adhesion_map": energy}
 
     @model_validator(mode="after")
     def _check_directions(self):
         if self.receding_energy is not None and not 0 < self.surface_energy <= self.receding_energy:
             raise ValueError(
-                f"surface_energy: the advancing value {self.surface_energy:g} J/m^2 must be positive, and at most the "
-                f"receding value {self.receding_energy:g} J/m^2"
+                f"surface_energy: advancing {self.surface_energy:g} J/m^2, receding {self.receding_energy:g} J/m^2; "
+                "expected 0 < advancing <= receding"
             )
         return self
 

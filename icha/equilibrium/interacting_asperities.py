@@ -205,7 +205,7 @@ def contact_of(surface: Surface, material: Material) -> InteractingAsperities:
         raise ValueError(
             f"thickness: {material.thickness:g} m; the asperity model is only for a half-space. Use boundary elements"
         )
-    if material.directed:
+    if material.directed or material.adhesion_map:
         raise ValueError("surface_energy: the asperity model has one work of adhesion. Use boundary elements")
     if surface.shape:
         raise ValueError("shape: the asperity model is only for nominally flat surfaces. Use boundary elements")

@@ -169,6 +169,8 @@ def _attributes(surface, material, path, name):
     )
     if model.by_cells:
         attributes["attraction"] = attraction_on(material, surface.spacing)
+    if material.adhesion_map:
+        attributes["adhesion_map"] = repr(material.adhesion_map)
     # A campaign sets the attributes that are empty here.
     empty = ("campaign", "study", "config_sha256", "program_sha256", "license")
     return attributes | {"contact_model": name} | dict.fromkeys(empty, "")
