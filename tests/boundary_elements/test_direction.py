@@ -99,7 +99,7 @@ def test_a_small_contact_pulls_off_like_a_punch():
 
 def test_two_equal_values_are_one_value():
     assert Material(MODULUS, (ADVANCING, ADVANCING)) == Material(MODULUS, ADVANCING)
-    with pytest.raises(ValueError, match="receding 0.02 J/m.*expected 0 < advancing"):
+    with pytest.raises(ValueError, match=r"receding 0.02 J.*expected 0 < advancing"):
         Material(MODULUS, (ADVANCING, 0.02))
     with pytest.raises(ValueError, match=r"pair \(advancing, receding\)"):
         Material(MODULUS, (0.1, 0.2, 0.3))
