@@ -261,8 +261,6 @@ _BY_ROW = {
         _GRID | {"approach": ("approach", "g"), "spots": ("patches", "g"), "asymmetry": ("asymmetry", ".2g")} | _ERRORS,
     ),
     "loops": ("loops", _LOOP),
-    "symmetry": ("symmetry", {"what": ("the same surface", "s")} | _SAME),
-    "steps": ("steps", {"steps": ("steps to the stop", "g")} | _SAME),
 }
 
 
@@ -270,6 +268,7 @@ def tables(rows: dict[str, list[dict]]) -> dict[str, Table]:
     """Return all tables of the page from the rows of all parts."""
     for row in rows["loops"]:
         row["with"] = "with" if row["adhesion"] else "without"
+    in_fewer_steps = [row | {"what": f"in {row['steps']} instead of 50 steps"} for row in rows["steps"][1:]]
     found = {
         "bounds": bounds(rows),
         "sphere": by_radius(rows["sphere"], {"area_error": "area", "force_error": "force"}),
@@ -279,6 +278,7 @@ def tables(rows: dict[str, list[dict]]) -> dict[str, Table]:
         "ellipse": turned(rows["ellipse"]),
         "ranges": towards_zero(rows["ranges"]),
         "cells": by_grid(rows["cells"]),
+        "symmetry": by([*rows["symmetry"], *in_fewer_steps], {"what": ("the same state", "s")} | _SAME),
         **{name: by(rows[part], columns) for name, (part, columns) in _BY_ROW.items()},
     }
     return {f"short_range_{name}": table for name, table in found.items()}
