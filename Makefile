@@ -92,13 +92,11 @@ short-range indenter applicability:
 	python -m validation.$(subst -,_,$@) $(OPTIONS)
 
 test: tamaas
-	pytest -n $(CORES) --dist worksteal -m "not slow" $(THOROUGH)
+	pytest -n $(CORES) --dist worksteal -m "not slow"
 
-# First the quick tests with more random cases, and the coverage of the physics by the tests of its folders. Then the
-# slow tests, in one process more than there are cores, because many of them wait.
-test-all: THOROUGH = --hypothesis-profile thorough --cov --cov-report=term
-test-all: test audit
-	pytest -n $$(($(CORES) + 1)) --dist loadfile -m slow --series $(SERIES)
+# All tests with more random cases, in one process more than there are cores, because many of them wait.
+test-all: tamaas audit
+	pytest -n $$(($(CORES) + 1)) --dist loadfile --hypothesis-profile thorough --series $(SERIES)
 
 random-cases: SERIES = 1-20
 random-cases: environment

@@ -1,15 +1,12 @@
-"""A small campaign whose surfaces each have a slope of their own, and the square that earlier versions made of it."""
+"""A small campaign whose surfaces each have a slope of their own."""
 
-from contextlib import contextmanager, nullcontext
 from functools import cache
 
 import compared_campaign as compared
-import numpy as np
 import small_campaign as small
 
 import icha
-from icha.analysis import model_error as comparison
-from icha.datasets import campaign_file
+from icha.analysis.model_error import model_error
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import RunLabels
 
@@ -38,32 +35,9 @@ def tree():
     return campaign_tree(runs().items(), attrs={"title": "Crops", "summary": "For tests.", "license": "CC0-1.0"})
 
 
-@contextmanager
-def in_squares():
-    """Arrange runs as earlier versions did: along all slopes of a study."""
-    modules = (campaign_file, comparison)
-    arrange = campaign_file.arrange_slopes
-    for module in modules:
-        module.arrange_slopes = lambda pairs: np.unique([slope for _, slope in pairs])
-    try:
-        yield
-    finally:
-        for module in modules:
-            module.arrange_slopes = arrange
-
-
-@cache
-def square_tree():
-    """The same in the form of earlier versions: a square of surfaces and slopes, of which the diagonal has runs."""
-    with in_squares():
-        return tree.__wrapped__()
-
-
-def errors(campaign):
-    """The error of the model in a campaign, `tree` or `square_tree`, in the same form."""
-    patches = [(labels, run) for labels, run in runs().items() if labels.model == "boundary_elements"]
-    with in_squares() if campaign is square_tree() else nullcontext():
-        return comparison.model_error(campaign, runs=patches)
+def errors():
+    """The error of the model in the campaign."""
+    return model_error(tree(), runs=[(labels, run) for labels, run in runs().items() if labels.model != "asperities"])
 
 
 def many(surfaces):

@@ -10,11 +10,9 @@ from icha.analysis.checks import (
     check_campaign,
     read_checks,
     refuse_unknown_failures,
-    worst,
     write_checks,
 )
-from icha.checks.findings import Check, RunArrays
-from icha.checks.loops import count_unshared_separations, work_error
+from icha.checks.findings import Check
 from icha.checks.run import check_run
 from icha.datasets.campaign import run_labels
 from icha.datasets.campaign_file import campaign_tree
@@ -146,16 +144,6 @@ def test_each_kind_of_damage_to_a_cycle_is_caught_by_its_check(name):
     assert name in failed(run)
 
 
-def test_where_jumps_in_are_uphill_only_their_sum_with_jumps_off_is_a_loss():
-    run = cyclic.run(between=2).copy(deep=True).assign(uphill_jump_in_count=0)
-    work = float(np.abs(run["work"]).max())
-    run["dissipated_by_jump_in"].values[-1] = 0.2 * work
-    run["dissipated_by_jump_off"].values[-1] = -0.1 * work
-    assert "jumps off lose energy" in failed(run)
-    run["uphill_jump_in_count"] = 1
-    assert failed(run).isdisjoint({"jumps off lose energy", "jumps lose energy"})
-
-
 def test_no_tolerance_covers_more_than_a_hundredth_of_the_work():
     run = cyclic.run(between=2).copy(deep=True)
     run["contact_stiffness"].values[...] *= 1e6
@@ -179,47 +167,6 @@ def test_a_loop_without_adhesion_must_close_unless_spots_have_united():
     assert failed(run) == set()
 
 
-def test_the_way_back_need_not_rise_but_the_way_in_must():
-    run = cyclic.run(material="hertz", between=2).copy(deep=True)
-    assert float(run["contact_area_fraction"].diff("step").min()) < 0
-    run["contact_area_fraction"].values[1] *= 1e-3
-    assert "area rises" in failed(run)
-
-
-def test_next_to_no_load_is_met_as_well_as_what_it_is_made_up_of():
-    """With adhesion a load may be the small difference of two large ones, which are about stiffness times h_rms."""
-    run = small.run(material="soft").copy(deep=True)
-    whole = abs(float(run["contact_stiffness"][0])) * float(run["rms_height"])
-    unit = float(run["contact_modulus"]) * float(run["rms_slope"])
-    run["step_kind"].values[0] = "reduced_pressure"
-    run["step_target"].values[0] = 1e-9 * whole / unit
-    # A load below a ten thousandth of both counts as none, and the error of one is measured against that.
-    for part, known in ((0.5e-8, True), (2e-8, False)):
-        run["reduced_pressure"].values[0] = run["step_target"].values[0] + 1e-4 * part * whole / unit
-        assert ("targets" not in failed(run)) == known
-
-
-def bare_run(separations, legs, stiffness=0.0, model="asperities"):
-    """What the errors of the work are made of, with an h_rms of 1 m."""
-    values = {"mean_separation": np.array(separations), "leg": np.array(legs), "unit_height": np.array(1.0)}
-    return RunArrays(values | {"contact_stiffness": np.full(len(legs), stiffness)}, {}, {"contact_model": model})
-
-
-def test_separations_that_only_the_way_back_meets_are_counted():
-    assert count_unshared_separations(bare_run([3.0, 2.0, 1.0, 2.0, 3.0], [0, 0, 0, 1, 1])) == 0
-    # To ten times the error of an equilibrium two are the same; turning points have their own.
-    assert count_unshared_separations(bare_run([3.0, 2.0, 1.0, 2.0 + 5e-9, 2.5, 2.0, 3.0], [0, 0, 0, 1, 1, 2, 3])) == 1
-    assert count_unshared_separations(bare_run([3.0, 2.0, 1.0, 0.5, 1.5, 3.5], [0, 0, 0, 1, 1, 1])) == 3
-
-
-def test_the_error_of_the_work_is_that_of_separations_and_stiffnesses():
-    """The integral of the cubic over a step: w (p + q)/2 + w^2 (k - l)/12, all p off by 1e-9 k, and all k by a part."""
-    for model, part in (("asperities", 1e-6), ("boundary_elements", 1e-4)):
-        run = bare_run([3.0, 1.0, 0.5], [0, 0, 0], stiffness=7.0, model=model)
-        expected = 7.0 * 1e-9 * 2.5 + 2 * 7.0 * part * (2.0**2 + 0.5**2) / 12
-        assert work_error(run) == pytest.approx(expected, rel=1e-12)
-
-
 def test_a_union_may_take_load_from_a_step_but_not_from_a_stop():
     run = cyclic.run(material="hertz", between=2).copy(deep=True)
     between = int(np.flatnonzero(run["step_kind"].values == "path")[0])
@@ -233,15 +180,6 @@ def test_a_union_may_take_load_from_a_step_but_not_from_a_stop():
     unions[stop:] = 2
     run["nominal_pressure"].values[stop] = 0.99 * run["nominal_pressure"].values[between - 1]
     assert "pressure rises" in failed(run) and "area rises" not in failed(run)
-
-
-def test_a_turning_point_without_a_load_is_met_within_the_accuracy_of_the_others():
-    run = cyclic.run(material="hertz").copy(deep=True)
-    run["step_kind"].values[-1] = "reduced_pressure"
-    run["step_target"].values[-1] = 0.0
-    assert "targets" not in failed(run)
-    run["reduced_pressure"].values[-1] = 1e-6
-    assert "targets" in failed(run)
 
 
 def test_a_run_without_steps_fails():
@@ -297,12 +235,6 @@ def test_only_failures_that_are_known_are_let_through():
     ):
         with pytest.raises(ValueError, match=f"^{reason}"):
             refuse_unknown_failures(checks, known)
-
-
-def test_worst_prefers_failures_and_then_large_values():
-    checks = [Check("a", v, 1.0, p, "", s) for v, p, s in ((0.5, True, "x"), (0.1, False, "y"), (0.9, True, "z"))]
-    assert [check.subject for check in worst(checks)] == ["y"]
-    assert [check.subject for check in worst([checks[0], checks[2]])] == ["z"]
 
 
 def test_findings_can_be_kept_also_of_values_that_are_not_finite(tmp_path):

@@ -1,14 +1,17 @@
-"""Studies are compared at common loads of the first loading; interpolation is exact at the stops and monotone."""
+"""Studies are compared at common loads of the first loading; statistics over seeds against known numbers."""
 
 import cyclic_campaign as cyclic
 import numpy as np
 import pytest
 import small_campaign as small
+import xarray as xr
 
-from icha.analysis.common_loads import compare_campaign, compare_runs, interpolate
+from icha.analysis.common_loads import at_common_loads, compare_campaign, compare_runs, interpolate
+from icha.datasets.campaign import reduced_gap
 from icha.datasets.campaign_file import campaign_tree
-from icha.datasets.files import read_campaign, write_dataset
+from icha.datasets.labels import LABELS, RunLabels
 from icha.figures.select import path_steps
+from icha.support.statistics import ensemble
 
 
 def test_comparison_is_of_the_first_loading():
@@ -44,13 +47,86 @@ def test_comparison_of_slopes_without_adhesion_shows_no_spread():
     assert float(comparison["slope_spread_at_load"].min()) > 1
 
 
-def test_studies_without_a_common_load_are_compared_where_possible(tmp_path):
-    labels, run = next((labels, run) for labels, run in small.runs() if labels.study == "slopes")
-    steep = run.isel(step=run["reduced_pressure"].values > 5e-3)
-    flat = small.run(rms_slope=0.2).isel(step=slice(0, steep.sizes["step"]))
-    keep = {"snapshot": slice(0, 0), "spot": slice(0, 0)}
-    tree = campaign_tree([(labels, steep.isel(keep)), (labels._replace(rms_slope=0.2), flat.isel(keep))])
-    comparison = compare_campaign(tree)
-    assert comparison["slopes"].sizes["relative_load"] == 0
-    write_dataset(comparison, tmp_path / "c.nc")
-    assert read_campaign(tmp_path / "c.nc")["slopes"].sizes["relative_load"] == 0
+def test_known_numbers():
+    # Student's own table: 2.776 for four degrees of freedom, 12.706 for one.
+    five = ensemble([1.0, 2.0, 3.0, 4.0, 5.0])
+    assert (float(five.mean), float(five.deviation), int(five.count)) == (3.0, pytest.approx(np.sqrt(2.5)), 5)
+    assert float(five.confidence) == pytest.approx(2.7764451 * np.sqrt(2.5 / 5), rel=1e-7)
+    two = ensemble([1.0, 3.0])
+    assert float(two.confidence) == pytest.approx(12.7062047, rel=1e-7)
+
+
+def test_bands_hold_the_mean_nineteen_times_of_twenty():
+    rng = np.random.default_rng(2)
+    over = ensemble(rng.normal(1.0, 3.0, (4, 40000)))
+    held = np.mean(np.abs(over.mean - 1.0) <= over.confidence)
+    assert held == pytest.approx(0.95, abs=4 * np.sqrt(0.05 * 0.95 / 40000))
+
+
+def test_members_without_a_value_do_not_count():
+    over = ensemble([[1.0, np.nan, np.nan], [3.0, 5.0, np.nan]])
+    np.testing.assert_array_equal(over.count, [2, 1, 0])
+    np.testing.assert_array_equal(over.mean, [2.0, 5.0, np.nan])
+    assert np.isfinite(over.confidence).tolist() == np.isfinite(over.deviation).tolist() == [True, False, False]
+
+
+def test_bands_of_positive_quantities_stay_above_zero_and_are_the_others_where_they_are_narrow():
+    # Three members whose Student's band reaches far below zero.
+    over = ensemble([1e-3, 5e-3, 2e-2])
+    low, high = over.band()
+    assert (low, high) == pytest.approx((over.mean - over.confidence, over.mean + over.confidence)) and low < 0
+    low, high = over.band(positive=True)
+    assert 0 < low < over.mean < high
+    # In the logarithm it is symmetric, with the relative standard error of the mean as its unit.
+    assert (
+        np.log(high / over.mean) == pytest.approx(np.log(over.mean / low)) == pytest.approx(over.confidence / over.mean)
+    )
+    narrow = ensemble([0.999, 1.0, 1.001])
+    np.testing.assert_allclose(narrow.band(positive=True), narrow.band(), rtol=1e-5)
+    np.testing.assert_array_equal(ensemble([-1.0, 1.0]).band(positive=True), ensemble([-1.0, 1.0]).band())
+
+
+def test_curves_of_other_stops_are_averaged_where_all_are():
+    one, other = np.geomspace(1e-4, 1e-1, 9), np.geomspace(1e-3, 1.0, 7)
+    at, members = at_common_loads([(one, 2 * one**0.9), (other, 4 * other**0.9)], logarithmic=True)
+    over = ensemble(members)
+    assert (at[0], at[-1]) == pytest.approx((1e-3, 1e-1))
+    np.testing.assert_allclose(over.mean, 3 * at**0.9, rtol=1e-9)
+    np.testing.assert_allclose(over.confidence, 12.7062047 * at**0.9, rtol=1e-7)
+    apart, _ = at_common_loads(
+        [(np.array([1e-3, 2e-3]), np.ones(2)), (np.array([1e-2, 2e-2]), np.ones(2))], logarithmic=True
+    )
+    assert len(apart) == 0
+
+
+def test_the_comparison_has_bands_over_the_complete_seeds():
+    runs = [(RunLabels("one", "asperities", "rough", seed, 1.0, "soft"), small.run(seed)) for seed in (1, 2, 3)]
+    runs.append(
+        (RunLabels("one", "asperities", "rough", 4, 1.0, "soft"), small.run(4).assign_attrs(incomplete="a test"))
+    )
+    comparison = compare_runs(campaign_tree(runs)["one"].to_dataset())
+    areas = comparison["contact_area_fraction"].transpose(*LABELS, ...).values[0, 0, :3, 0, 0]
+    expected = ensemble(areas)
+    assert comparison["seed_count"].item() == 3
+    for name in ("mean", "deviation"):
+        np.testing.assert_allclose(comparison[f"area_{name}"].values[0, 0, 0, 0], getattr(expected, name), rtol=1e-12)
+        assert np.all(comparison[f"separation_{name}"].values > 0)
+    # A quarter of the seeds is missing, so no interval is stated.
+    assert np.isnan(comparison["area_confidence"]).all()
+    whole = compare_runs(campaign_tree(runs[:3])["one"].to_dataset())["area_confidence"]
+    np.testing.assert_allclose(whole.values[0, 0, 0, 0], expected.confidence, rtol=1e-12)
+    one = compare_runs(campaign_tree(runs[:1])["one"].to_dataset())
+    assert np.isnan(one["area_confidence"].values).all() and np.isfinite(one["area_mean"].values).all()
+
+
+def test_separations_of_a_free_square_are_compared_by_its_mean_gap():
+    study = xr.Dataset(
+        {
+            "reduced_separation": (("surface", "step"), [[2.0, 1.0], [-1.0, -2.0]]),
+            "mean_gap": (("surface", "step"), [[4e-6, 2e-6], [3e-6, 1e-6]]),
+            "rms_height": ("surface", [2e-6, 1e-6]),
+            "boundary": ("surface", ["periodic", "free"]),
+        }
+    )
+    np.testing.assert_allclose(reduced_gap(study), [[2.0, 1.0], [3.0, 1.0]])
+    np.testing.assert_allclose(reduced_gap(study.isel(surface=1)), [3.0, 1.0])

@@ -202,23 +202,6 @@ def test_words_tables_and_latex_state_the_same_numbers(answers, tmp_path):
     assert "\n".join(sentences(rows)) in icha() and all(each.number in icha() for each in rows)
 
 
-def test_the_largest_cause_is_named(answers):
-    study = answers["one"].to_dataset().isel(answer=[0])
-
-    def limit(**shares):
-        changed = study.assign(
-            {f"share_{name}": xr.full_like(study["share_grid"], value) for name, value in shares.items()}
-        )
-        (found,) = answers_of(changed)
-        return found.limit
-
-    assert "The grid limits the accuracy: ± 9 % of the value" in limit(grid=0.09, seeds=0.01)
-    assert limit(seeds=0.09, grid=0.0).startswith("The 3 seeds of the asperity model limit the accuracy: with twice as")
-    assert "29 % narrower" in limit(seeds=0.09, grid=0.0)
-    assert "2 seeds of boundary elements limit" in limit(refinement=0.09, grid=0.0, seeds=0.01)
-    assert "The error of the grid is unknown." in limit(seeds=0.09, grid=math.nan)
-
-
 def test_tensile_forces_have_their_lower_end_first(answers):
     """Texts and the table for LaTeX state a mean force of -58 µN as one of 58 µN, but with a sign."""
 
@@ -235,21 +218,3 @@ def test_tensile_forces_have_their_lower_end_first(answers):
     assert answers_of(force(-84e-6, -32e-6))[0].estimate == "-58 µN, from -84 to -32 µN"
     latex = answers_table([answer]).as_latex()
     assert r"$-$58 µN $\pm$ 12 µN" in latex
-
-
-def test_only_intervals_of_loads_pass_zero():
-    labels = RunLabels("pull", "boundary_elements", "rough", 1, 1.0, "soft")
-    run = cyclic.unloaded(small.run(seed=1, material="soft")).assign_attrs(contact_model=labels.model)
-    factors = {1: -1.0, 2: 0.5, 3: 2.0}  # the loads of seed 1 are tensile
-    names = "nominal_pressure", "contact_stiffness"
-    tree = campaign_tree(
-        (labels._replace(seed=seed), run.assign({name: run[name] * factor for name in names}))
-        for seed, factor in factors.items()
-    )
-    study = estimate_campaign(tree)["pull"].to_dataset()
-    pressure, stiffness = (study.isel(answer=np.flatnonzero(study["quantity"] == name)[0]) for name in names)
-    assert pressure["estimate"] > 0 > pressure["estimate_low"]
-    assert pressure["estimate"] - pressure["estimate_low"] == pytest.approx(
-        float(pressure["estimate_high"] - pressure["estimate"])
-    )
-    assert stiffness["estimate_low"] == 0

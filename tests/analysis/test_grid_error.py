@@ -1,6 +1,5 @@
 """Errors of boundary elements due to the grid: laws from the measurements, and words where numbers stand."""
 
-import itertools
 import math
 
 import cyclic_campaign as cyclic
@@ -15,8 +14,6 @@ from icha.analysis.grid_error import (
     AREA_ERROR,
     LOOP_ERRORS,
     cells_of_length,
-    describe_lightest_state,
-    describe_loops,
     error_beyond,
 )
 from icha.analysis.validity import statements_on_dataset
@@ -58,13 +55,6 @@ def test_law_of_areas_is_that_of_the_measurements():
     assert np.mean(np.abs(rows[:, 2]) < 2 * AREA_ERROR.at(rows[:, 1])) > 0.8
 
 
-@pytest.mark.parametrize("law", LOOP_ERRORS.values())
-def test_errors_of_loops_fall_with_the_cells(law):
-    errors = [law.at(cells) for cells in np.geomspace(0.3, 30, 20)]
-    assert all(0 < fine < coarse < 1 for coarse, fine in itertools.pairwise(errors))
-    assert law.at(law.least_cells) == pytest.approx(0.2)
-
-
 def test_length_of_a_summit_in_cells():
     spectrum = icha.SelfAffineSpectrum(100e-6, 50e-6, 12.5e-6, 0.8, 0.1)
     surface, material = spectrum.realise(64, 1), icha.Material(25e6, 0.02, 1e-8)
@@ -89,12 +79,6 @@ def test_loops_on_a_coarse_grid_are_named_and_pale():
     assert {each.about: each.good for each in statements_on_dataset(fine)}["loops"]
 
 
-def test_coarsest_loops_are_named_first():
-    text = describe_loops({("soft", "rough"): 3.0, ("hard", "rough"): 0.5})
-    assert text.index("0.5 cells for hard on rough") < text.index("3 cells for soft on rough")
-    assert "hard on rough (pull-off of unknown error, loss of unknown error)" in text
-
-
 def test_estimates_of_loops_say_that_the_error_of_the_grid_is_not_known():
     tree = estimate_campaign(loops(0.7))
     answers = answers_of(tree["pull"].to_dataset())
@@ -112,14 +96,3 @@ def test_estimates_are_silent_only_if_the_interval_contains_the_expected_error()
     assert error_beyond(math.nan, "pull_off_pressure", math.nan, math.nan, math.nan).endswith("error is not known")
     assert "4 contact patches of 10 cells" in error_beyond(math.nan, "contact_area_fraction", math.nan, 4, 40)
     assert error_beyond(math.nan, "mean_gap", math.nan, 4, 40) == ""
-
-
-def test_lightest_state_has_the_fewest_cells():
-    tree = loops(0.7)
-    run = small.run(seed=1, material="soft")
-    cells = [
-        float(small.run(seed=seed, material="soft")["contact_area_fraction"][0] * run["grid"] ** 2) for seed in (1, 2)
-    ]
-    text = describe_lightest_state(tree, ["pull"])
-    patches = int(small.run(seed=1 + int(np.argmin(cells)), material="soft")["spot_count"][0])
-    assert f"areas of {patches} contact patch" in text and f" of {min(cells) / patches:.0f} cells" in text

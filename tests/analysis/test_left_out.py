@@ -149,10 +149,3 @@ def test_the_caption_of_a_figure_of_losses_counts_the_loops_without_a_loss():
     assert count_runs(data, ["pull"]) == ""
     caption = count_runs(data, ["pull"], of_loss=True)
     assert caption.startswith("The figure shows 3 of 5 runs; 2 failed a check of the loss; the others are a biased")
-
-
-def test_runs_without_adhesion_are_not_among_those_without_a_loss():
-    study = loops(gains=(2, 3))["pull"].to_dataset()
-    bare = study.assign(surface_energy=0 * study["surface_energy"])
-    assert left_out_of_study(bare, of_loss=True).words == ""
-    assert "2 failed a check of the loss" in left_out_of_study(study, of_loss=True).words

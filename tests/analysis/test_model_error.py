@@ -1,5 +1,6 @@
 """The error is nothing for a state compared with itself, and the exact number for one changed by a known amount."""
 
+import compared_campaign as compared
 import numpy as np
 import pytest
 import small_campaign as small
@@ -17,10 +18,10 @@ from compared_campaign import (
 )
 
 import icha
+from icha.analysis.measured_error import _range, measured_errors
 from icha.analysis.model_error import (
     AXES,
     SHARED,
-    SUMMARISED,
     contact_of_spots,
     distribution_distance,
     jaccard,
@@ -34,7 +35,6 @@ from icha.datasets.campaign import find_snapshot
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import read_campaign, write_dataset
 from icha.datasets.labels import RunLabels
-from icha.datasets.variables.campaign import COMPLETE, INCOMPLETE
 
 
 def compared_with(truths):
@@ -58,46 +58,6 @@ def test_relative_errors_are_those_put_in():
     assert float(np.sum(state["pressure_density"].values * edges)) == pytest.approx(area, rel=1e-9)
 
 
-def test_boundary_elements_are_compared_at_the_same_stops():
-    compared = compared_with(patches(area=1.25, separation=0.8))
-    assert compared["reduced_pressure"].values.tolist() == list(PRESSURES)
-    assert (compared["status"] == COMPLETE).all()
-    # At a short range, the energetic area is the area. What was changed are areas, not the distributions and maps.
-    np.testing.assert_array_equal(compared["energetic_area_error"], compared["area_error"])
-    np.testing.assert_allclose(compared["gap_distribution_distance"], 0, atol=1e-12)
-    np.testing.assert_array_equal(compared["jaccard"], 1)
-    np.testing.assert_allclose(compared["residual"], 1e-4)
-    np.testing.assert_allclose(compared["load_error"], 0, atol=1e-6)
-
-
-def test_loads_without_a_snapshot_have_errors_of_area_and_separation_only():
-    kept = [(labels, run.isel(snapshot=[1])) for labels, run in patches(area=2.0)]
-    errors = compared_with(kept)
-    np.testing.assert_allclose(errors["area_error"], -0.5, rtol=1e-12)
-    assert np.isnan(errors["jaccard"].isel(reduced_pressure=0)).all()
-    np.testing.assert_array_equal(errors["jaccard"].isel(reduced_pressure=1), 1)
-
-
-def test_a_cell_is_in_contact_from_its_half_on():
-    ((labels, run), *_) = patches(lambda labels: labels.seed == 1)
-    covered = run["contact_map"] > 0
-    slight = run.assign(contact_map=xr.where(covered, run["contact_map"], np.float32(0.4)))
-    half = run.assign(contact_map=(0.5 * covered).astype(np.float32))
-    for changed in (slight, half):
-        errors = compared_with([(labels, changed)])
-        np.testing.assert_array_equal(errors["jaccard"], 1)
-
-
-def test_runs_that_failed_by_either_model_do_not_count():
-    (first, *others) = patches(area=1.25)
-    labels, run = first
-    errors = compared_with([(labels, run.isel(step=[0]).assign_attrs(incomplete="stuck")), *others])
-    place = {label: getattr(labels, label) for label in ("surface", "seed", "rms_slope", "material")}
-    assert int(errors["status"].sel(place)) == INCOMPLETE
-    assert np.isnan(errors["area_error"].sel(place)).all()
-    np.testing.assert_allclose(errors["area_error_mean"], 1 / 1.25 - 1, rtol=1e-12)
-
-
 def test_the_energetic_area_is_that_of_a_finite_range():
     compared = errors()["one"].to_dataset()
     expected = 1 / (1.2 * np.array(list(AREA_FACTORS.values()))) - 1
@@ -110,17 +70,6 @@ def test_the_energetic_area_is_that_of_a_finite_range():
     assert set(bare["attraction"].values.ravel()) == {NO_ATTRACTION}
     short = compared_with(patches())["attraction"].sel(material="soft")
     assert set(short.values.ravel()) == {SHORT_RANGE}
-
-
-def test_scatter_over_the_seeds():
-    pairs = [pair for pair in patches_at_finite_range() if pair[0].material == "soft"]
-    compared = compared_with(reversed(pairs))
-    expected = 1 / np.array(list(AREA_FACTORS.values())) - 1
-    np.testing.assert_allclose(compared["area_error_mean"].values, expected.mean(), rtol=1e-12)
-    np.testing.assert_allclose(compared["area_error_deviation"].values, expected.std(ddof=1), rtol=1e-12)
-    single = compared_with([pair for pair in pairs if pair[0].seed == 2])
-    np.testing.assert_allclose(single["area_error_mean"].values, 1 / 1.2 - 1, rtol=1e-12)
-    assert not [f"{name}_deviation" for name in SUMMARISED if f"{name}_deviation" in single]
 
 
 def distribution(gaps=(), pressures=(), rms_height=2e-6, unit=5e6):
@@ -231,11 +180,33 @@ def test_runs_that_ended_early_do_not_count(tmp_path):
     truths = [(labels, run) for labels, run in patches_at_finite_range() if labels != unsolved]
     found = model_error(campaign_tree([*members.items(), *truths]), truths)
     write_dataset(found, tmp_path / "e.nc")
-    for compared in (found["one"].to_dataset(), read_campaign(tmp_path / "e.nc")["one"].to_dataset()):
-        soft, bare = (compared.isel(surface=0, rms_slope=0).sel(material=name) for name in ("soft", "hertz"))
+    for study in (found["one"].to_dataset(), read_campaign(tmp_path / "e.nc")["one"].to_dataset()):
+        soft, bare = (study.isel(surface=0, rms_slope=0).sel(material=name) for name in ("soft", "hertz"))
         assert soft["status"].values.tolist() == [0, 0, 1] and bare["status"].values.tolist() == [1, 1, 3]
         known = np.array([1 / 1.1, 1 / 1.2]) - 1
         np.testing.assert_allclose(soft["area_error"].values, [[known[0]] * 2, [known[1]] * 2, [np.nan] * 2])
         np.testing.assert_allclose(soft["area_error_mean"].values, known.mean())
         np.testing.assert_allclose(soft["area_error_deviation"].values, abs(known[0] - known[1]) / np.sqrt(2))
         assert np.isnan(bare["area_error"]).all() and np.isnan(bare["area_error_mean"]).all()
+
+
+def test_the_error_of_each_study_is_stated_with_its_range_and_its_size():
+    truths = compared.patches(area=1.25, separation=0.8)
+    errors = model_error(compared.tree_of_both(), truths)
+    (statement,) = measured_errors(errors).values()
+    assert statement.about == "error" and statement.text == (
+        "of the asperity model in study one: contact area 20 to 20 % too small, mean separation 25 to 25 % too large "
+        "(3 seeds, 2 loads, boundary elements)"
+    )
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ([-0.18, -0.11, np.nan], "11 to 18 % too small"),
+        ([0.02, 0.05], "2 to 5 % too large"),
+        ([-0.03, 0.05], "from 3 % too small to 5 % too large"),
+    ],
+)
+def test_ranges_have_one_sign_convention(values, words):
+    assert _range(np.array(values)) == words

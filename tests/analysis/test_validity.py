@@ -7,22 +7,14 @@ import pytest
 import small_campaign as small
 from conftest import REPOSITORY
 
-import icha
 from icha.analysis.validity import (
-    VALIDATED,
     VALIDATION,
     Case,
-    join_first,
-    outside_validation,
     statements,
     statements_on_dataset,
 )
-from icha.configuration.load import load_configuration
 from icha.datasets.campaign_file import campaign_tree
-from icha.planning.validity import surface_facts
-from icha.surfaces.moments import height_statistics, slope_anisotropy, spectral_moments
-from icha.surfaces.resolution import Resolution, resolution_of
-from icha.surfaces.summits import locate_summits
+from icha.surfaces.resolution import Resolution
 
 
 @pytest.mark.parametrize("adhesive", [False, True])
@@ -59,18 +51,6 @@ def told(*arguments):
     return {statement.about: (statement.text, statement.good) for statement in statements(*arguments)}
 
 
-def test_each_kind_is_said_in_one_line():
-    models = {"load": ["asperities", "boundary_elements"], "pull": ["asperities"]}
-    found = told(models, [case(INSIDE), case(BARE, material="bare")], "")
-    assert list(found) == ["models", "adhesion", "jump-in", "accuracy"]
-    assert all(good for _, good in found.values())
-    assert "asperities in load, pull" in found["models"][0] and "boundary elements in load" in found["models"][0]
-    assert "8 to 25 %" in found["accuracy"][0] and "5 to 21 %" in found["accuracy"][0]
-    assert "8 to 25 %" not in told({}, [case(BARE)])["accuracy"][0]
-    assert set(told({}, [case({"full_contact_energy_ratio": math.inf}, model="boundary_elements")])) == {"models"}
-    assert join_first("abcdef") == "a, b, c, d and 2 more" and join_first("ab") == "a, b"
-
-
 @pytest.mark.parametrize(
     ("name", "value", "reason"),
     [
@@ -97,45 +77,6 @@ def test_sticky_materials_are_named():
     assert text.endswith("the asperity model is applicable up to the contact area A/A0 = 0.0028")
     text, good = told({}, [case(INSIDE), case({**INSIDE, "full_contact_energy_ratio": 20.0})])["adhesion"]
     assert good and "about 20 or more (soft on rough)" in text and "applicable" not in text
-
-
-def test_the_range_of_the_validation_is_that_of_its_surfaces():
-    campaign = load_configuration(REPOSITORY / "config/campaigns/validation.yaml").campaign
-    study = campaign.studies["short_range"]
-    found = {name: [] for name in VALIDATED}
-    for name in study.surfaces:
-        section = campaign.surfaces[name]
-        lengths = section.period, section.rolloff_wavelength, section.short_wavelength
-        material = campaign.materials["cmc"]
-        # What is expected of it, before a run, is inside.
-        expected = surface_facts(campaign, name)
-        assert not outside_validation(expected)
-        for seed in study.seeds:
-            surface = icha.SelfAffineSpectrum(*lengths, section.hurst).realise(section.grid, seed)
-            skewness, kurtosis = height_statistics(surface)
-            energy = surface.full_contact_energy
-            summits = locate_summits(surface)
-            unsupported = len(summits.unsupported_height)
-            measured = {
-                "unsupported_summits": unsupported / (len(summits) + unsupported),
-                "slope_anisotropy": slope_anisotropy(surface),
-                "height_skewness": skewness,
-                "height_kurtosis": kurtosis,
-                "nayak_parameter": spectral_moments(surface).nayak_parameter,
-                "nodes_per_short_wave": resolution_of(surface).cells,
-                "free_edges": 0,
-                "full_contact_energy_ratio": energy * material.contact_modulus / material.surface_energy,
-            }
-            assert not outside_validation(measured)
-            for key, value in measured.items():
-                found[key].append(value)
-    # Nothing much wider than what was validated, where there is an end.
-    assert max(found["nayak_parameter"]) > 0.98 * VALIDATED["nayak_parameter"].most
-    # An estimate for a measured surface may be 14 % too small.
-    assert 0.86 * min(found["nodes_per_short_wave"]) < 1.02 * VALIDATED["nodes_per_short_wave"].least
-    assert min(found["full_contact_energy_ratio"]) < 1.02 * VALIDATED["full_contact_energy_ratio"].least
-    assert max(map(abs, found["height_skewness"])) > 0.15
-    assert min(found["height_kurtosis"]) < 2.4 and max(found["height_kurtosis"]) > 3.4
 
 
 def test_the_data_say_where_spots_lay_outside():

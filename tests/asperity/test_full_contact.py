@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-import scipy.fft
 from scipy.special import ndtr
 
 import icha
@@ -37,14 +36,6 @@ def test_a_free_square_has_the_energy_of_its_mirror_images():
     mirrored = np.block([[heights, heights[:, ::-1]], [heights[::-1], heights[::-1, ::-1]]])
     expected = icha.Surface(mirrored, 2 * L).full_contact_energy
     assert icha.Surface(heights, L, "free").full_contact_energy == pytest.approx(expected)
-
-
-def test_it_is_the_work_of_the_pressure_that_flattens_the_surface():
-    surface = icha.SelfAffineSpectrum(100e-6, 40e-6, 14.3e-6, 0.8, 0.7).realise(33, 1)
-    k = scipy.fft.fftfreq(33, surface.spacing) * 2 * np.pi
-    pressure = scipy.fft.ifft2(np.hypot(k[:, None], k) / 2 * scipy.fft.fft2(surface.heights)).real
-    assert surface.full_contact_energy == pytest.approx(np.mean(pressure * surface.heights) / 2)
-    assert surface.scaled_to_rms_slope(1.4).full_contact_energy == pytest.approx(4 * surface.full_contact_energy)
 
 
 @pytest.mark.parametrize(

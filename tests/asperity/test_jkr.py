@@ -1,4 +1,4 @@
-"""The law of one asperity against closed forms, the published reference points, and quadrature of its pressure."""
+"""The law of one asperity against closed forms, published reference points, quadrature, and the equations of Maugis."""
 
 import numpy as np
 import pytest
@@ -8,6 +8,7 @@ from half_space import displacement_by_quadrature
 
 from icha import Material
 from icha.asperity.jkr import JKR
+from icha.asperity.tabor import describe_short_range, sphere_pull_off_factor
 
 MODULUS, ENERGY, RANGE = 25e6, 0.05, 2.071e-9
 R = 60.1e-9
@@ -209,18 +210,26 @@ def test_pressure_distribution_by_counting(both):
             assert force == pytest.approx(expected, abs=1e-5 * abs(law.force(a, R)))
 
 
-def test_pressure_tail_falls_as_the_inverse_cube(law):
-    a = units(R)[0]
-    peak, neck = law.pressure_amplitudes(a, R)
-    deep = np.array([-1e4, -1e8]) * peak
-    area, _ = law.pressure_distribution(deep, a, R)
-    np.testing.assert_allclose(area, np.pi * a**2 * (neck / deep) ** 2, rtol=1e-3)
+def exact_pull_off_factor(tabor_parameter):
+    """Solve Maugis's equations for the contact radius a at ratios m = c/a of both radii; return the largest tension."""
+    parameter = 1.157 * tabor_parameter
+    m = 1 + np.geomspace(1e-5, 1e4, 200_001)
+    root, angle = np.sqrt(m**2 - 1), np.arctan(np.sqrt(m**2 - 1))
+    square = parameter / 2 * (root + (m**2 - 2) * angle)
+    linear = 4 / 3 * parameter**2 * (root * angle - m + 1)
+    a = (np.sqrt(linear**2 + 4 * square) - linear) / (2 * square)
+    return -np.min(a**3 - parameter * a**2 * (root + m**2 * angle))
 
 
-@pytest.mark.parametrize(
-    ("argument", "value"), [("contact_modulus", "25 MPa"), ("surface_energy", -1e-3), ("interaction_range", 0.0)]
-)
-def test_bad_material_is_refused_by_name(argument, value):
-    good = {"contact_modulus": MODULUS, "surface_energy": ENERGY, "interaction_range": RANGE}
-    with pytest.raises(ValueError, match=argument):
-        Material(**(good | {argument: value}))
+@pytest.mark.parametrize("tabor_parameter", [0.03, 0.1, 0.344, 1.0, 3.0, 10.0])
+def test_pull_off_forces_are_those_of_maugis(tabor_parameter):
+    assert sphere_pull_off_factor(tabor_parameter) == pytest.approx(exact_pull_off_factor(tabor_parameter), rel=2e-4)
+
+
+def test_limits_are_rigid_and_soft_spheres():
+    assert sphere_pull_off_factor(1e-6) == pytest.approx(2.0) and sphere_pull_off_factor(1e6) == pytest.approx(1.5)
+    assert describe_short_range(3.0) == ""
+    # A glass bead of 10 um with 50 mJ/m^2 and a range of 0.5 nm.
+    assert "is 1.76 pi dgamma R by the theory of Maugis, 18 % more than for a short range" in describe_short_range(
+        0.344
+    )

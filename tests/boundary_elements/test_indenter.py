@@ -9,11 +9,9 @@ from icha import Material, Path, SelfAffineSpectrum, Surface
 from icha.boundary_elements.contact import contact_of
 from icha.contact.model import JUMP_IN, JUMP_OFF
 from icha.path.follow import follow
-from icha.surfaces.shapes import Paraboloid, Sphere
+from icha.surfaces.shapes import Sphere
 from validation import indenter_contacts as contacts
 from validation import rough_indenters
-from validation.elliptic_contacts import elliptic_pull_off
-from validation.single_contacts import largest_tension
 
 
 @pytest.mark.parametrize("place", contacts.PLACES)
@@ -53,14 +51,6 @@ def test_cone_follows_sneddon_and_maugis():
         if row["cells"] >= 8:
             assert abs(row["force_error"]) < 0.025, row
             assert abs(row["approach_error"]) < 0.01, row
-
-
-def test_ellipse_is_pulled_off_at_the_force_of_the_stationary_ellipse():
-    radii = (2**0.5, 0.5**0.5)
-    contact = contacts.indenter(Paraboloid(radii), 48, 1 / 6)
-    state = contact.equilibrium(contact.untouched(), 0.3)
-    tension, _ = largest_tension(contact, state, 0.05)
-    assert tension == pytest.approx(-elliptic_pull_off(radii, 1.0, 1.0).force, rel=5e-3)
 
 
 def test_small_waves_along_and_across_the_front_change_its_stress_intensity():

@@ -98,18 +98,6 @@ def test_exponential_attraction_gives_the_contacts_of_tamaas(adhesion, reach):
         assert np.array_equal(gap == 0, other_gap <= 0) and (gap == 0).any()
 
 
-@pytest.mark.parametrize("mean_gap", [1.2, 0.6, 0.1])
-def test_exponential_attraction_has_the_same_state_at_given_load_and_mean_gap(mean_gap):
-    law = exponential_law(material_of(0.3, 0.3))
-    by_gap = solve(law, Control(mean=mean_gap * UNIT))
-    by_load = solve(law, Control(load=by_gap.load))
-    assert by_gap.load > 0
-    assert by_load.position.mean() == pytest.approx(mean_gap * UNIT, rel=1e-7)
-    assert np.abs(by_load.position - by_gap.position).max() <= 4 * TOLERANCE
-    assert np.abs(by_load.pressure - by_gap.pressure).max() <= 1e-7 * np.abs(by_gap.pressure).max()
-    assert np.array_equal(by_load.held, by_gap.held)
-
-
 # Factors of the work of adhesion: stripes of 8 cells with 0.3 and with 3, and the same everywhere.
 STRIPES = np.broadcast_to(np.where(np.arange(GRID) // 8 % 2, 3.0, 0.3), HEIGHTS.shape)
 UNIFORM = np.ones(HEIGHTS.shape)
@@ -157,16 +145,6 @@ def test_stripes_have_the_contacts_that_an_independent_minimiser_finds(attractio
         assert gap.mean() == pytest.approx(best.x.mean(), rel=1e-7)
         assert np.abs(gap.ravel() - best.x).max() <= 1e-6 * UNIT
         assert np.array_equal(gap.ravel() == 0, best.x == 0) and (gap == 0).any()
-
-
-def test_energy_of_a_state_contains_the_works_of_the_stripes():
-    contact = contact_with_factors(Cohesive, STRIPES)
-    state = contact.relax_region(HEIGHTS > 2 * UNIT, 1.2 * SURFACE.rms_height)
-    gap = contact.gap(state) / SURFACE.spacing
-    position = np.maximum(gap, 0) + HEIGHTS
-    elastic = 0.5 * np.vdot(position, contact.space.pressure(position))
-    energy = elastic + np.sum(contact.attraction.bonds(gap).energy(np.maximum(gap, 0).ravel()))
-    assert contact.stored_energy(state) == pytest.approx(energy * MODULUS * SURFACE.spacing / GRID**2, rel=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -1,16 +1,13 @@
-"""Boundary elements on rough surfaces: against Tamaas, their symmetries, steps, energy, threads."""
+"""Boundary elements on rough surfaces and waves: against Tamaas, symmetries, steps, energy, hopping fronts."""
 
 import dataclasses
-import hashlib
-import os
-import subprocess
-import sys
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY
 
 import icha
+from icha import Material, Path, Surface, simulate
+from icha.boundary_elements.contact import BoundaryElements
 from icha.checks.run import check_run
 from icha.contact.models import AREA_TOLERANCE_CELLS, MODELS, REFERENCE_MODEL
 from validation.rough_contacts import (
@@ -61,14 +58,14 @@ def test_a_load_is_met_with_the_same_area_in_one_step_and_in_several():
 
 def test_loop_without_adhesion_gives_all_work_back():
     """But for the error of the integral of the pressure, whose slope jumps with every cell that closes."""
-    row = loop(rough(64, 8), 1e-2, 0.2, HARD)
-    assert abs(row["work"]) <= 5e-4 * row["largest_work"]
+    row = loop(rough(48, 6), 1e-2, 0.2, HARD)
+    assert abs(row["work"]) <= 1e-6 * row["largest_work"]
     assert abs(row["not_closed"]) <= 1e-10 * row["largest_work"]
 
 
 @pytest.mark.slow
 def test_loss_of_a_loop_with_adhesion_hardly_depends_on_the_step():
-    coarse, fine = (loop(rough(96, 12), 1e-2, step) for step in (0.2, 0.1))
+    coarse, fine = (loop(rough(64, 8), 1e-2, step) for step in (0.2, 0.1))
     for row in (coarse, fine):
         assert abs(row["not_closed"]) <= 1e-6 * row["largest_work"]
     assert coarse["work"] == pytest.approx(fine["work"], abs=1e-4 * fine["largest_work"])
@@ -102,44 +99,13 @@ def test_attraction_of_shorter_and_shorter_range_tends_to_the_limit():
         assert near < far
 
 
-BY_THREADS = """
-import sys
-from threadpoolctl import threadpool_limits
-from icha.boundary_elements.contact import contact_of
-from validation.rough_contacts import SOFT, states_at, rough
-
-with threadpool_limits(1):
-    (state,) = states_at(contact_of(rough(64, waves=8), SOFT), [2.2])
-for part in (state.cells, state.fraction, state.pressure, state.mean_fraction):
-    sys.stdout.buffer.write(part.tobytes())
-"""
-
-
-@pytest.mark.slow
-def test_threads_change_no_byte():
-    digests = set()
-    for threads in ("1", "2"):
-        environment = os.environ | {"OMP_NUM_THREADS": threads, "OPENBLAS_NUM_THREADS": threads}
-        command = [sys.executable, "-c", BY_THREADS]
-        run = subprocess.run(command, cwd=REPOSITORY, env=environment, check=True, stdout=subprocess.PIPE)
-        digests.add(hashlib.sha256(run.stdout).hexdigest())
-    assert len(digests) == 1
-
-
-def sphere(grid, centre):
-    """A paraboloid of R = 200 um in a cell of 100 um, its centre (x, y) off a node, in cells."""
-    x, y = ((np.arange(grid) - each + grid / 2) % grid - grid / 2 for each in centre)
-    return icha.Surface(-(np.add.outer(y**2, x**2)) * (1e-4 / grid) ** 2 / 4e-4, 1e-4)
-
-
-@pytest.mark.parametrize(
-    "centre", [pytest.param((0.0, 0.0), marks=pytest.mark.slow), (0.5, 0.5)], ids=["at a node", "between four"]
-)
-def test_sphere_in_the_middle_of_a_cell_can_be_pulled_off(centre):
+def test_sphere_in_the_middle_between_four_cells_can_be_pulled_off():
     """Symmetric cells come to their limits together: the front must be let run when its equilibrium is lost."""
+    x = np.arange(64) - 31.5
+    surface = icha.Surface(-np.add.outer(x**2, x**2) * (1e-4 / 64) ** 2 / 4e-4, 1e-4)  # R = 200 um
     material = icha.Material(contact_modulus=1e6, surface_energy=1e-2, interaction_range=20e-9)
     path = icha.Path(reduced_pressures=[1e-3], unload=True, max_step=0.5)
-    run = icha.simulate(sphere(64, centre), material, path, model="boundary_elements")
+    run = icha.simulate(surface, material, path, model="boundary_elements")
     pull_off = float(run.pull_off_pressure) * 1e-8
     assert pull_off == pytest.approx(1.5 * np.pi * 1e-2 * 200e-6, rel=0.01)
     assert float(run.loss_by_jump_off) > 0 and run.contact_area_fraction.values[-1] == 0
@@ -179,12 +145,33 @@ def test_an_area_of_few_cells_is_met_to_two_of_them():
     assert "one grid cell is 0.000244 of the nominal area, so use a finer grid" in str(caught.value)
 
 
-@pytest.mark.parametrize("slope", [pytest.param(1.0, marks=pytest.mark.slow), 1e-9])
-def test_no_load_is_as_little_on_flat_surfaces_as_on_steep_ones(slope):
+def test_no_load_is_as_little_on_flat_surfaces_as_on_steep_ones():
     steep = icha.SelfAffineSpectrum(100e-6, 50e-6, 25e-6, 0.8, 1.0).realise(24, seed=1)
-    factor = slope / steep.rms_slope
+    factor = 1e-9 / steep.rms_slope
     surface = icha.Surface(steep.heights * factor, steep.period)
     material = icha.Material(25e6, 0.2 * factor**2, 2e-9 * factor)
     path = icha.Path([2e-3], turning_points=[("reduced_pressure", 0.0)], max_step=0.5)
     run = icha.simulate(surface, material, path, model="boundary_elements")
+    assert not [check for check in check_run(run) if not check.passed]
+
+
+PERIOD, HEIGHT, CELLS = 100e-6, 1e-6, 16
+
+
+@pytest.mark.slow
+def test_a_loop_whose_front_hops_takes_few_equilibria(monkeypatch):
+    # No jump makes this contact, and no shorter step makes the work that is lost in hops better known.
+    count, equilibrium = 0, BoundaryElements.equilibrium
+
+    def counted(*arguments, **options):
+        nonlocal count
+        count += 1
+        return equilibrium(*arguments, **options)
+
+    monkeypatch.setattr(BoundaryElements, "equilibrium", counted)
+    wave = np.cos(2 * np.pi * np.arange(CELLS) / CELLS)
+    surface = Surface(HEIGHT * (wave[:, None] + wave), PERIOD, "periodic")
+    path = Path(area_fractions=[0.2], unload=True, snapshots=[])
+    run = simulate(surface, Material(1e6, 3e-3, 300e-9), path, model=REFERENCE_MODEL)
+    assert count < 600
     assert not [check for check in check_run(run) if not check.passed]

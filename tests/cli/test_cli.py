@@ -9,33 +9,25 @@ import sys
 from pathlib import Path
 from types import SimpleNamespace
 
-import h5py
-import netCDF4
 import numpy as np
 import pytest
 import small_campaign as small
-import typer
 import yaml
 from conftest import REPOSITORY
 from tiny_campaign import CAMPAIGN as TINY
 from typer.testing import CliRunner
 
-from icha.analysis.checks import check_campaign, write_checks
 from icha.cli import app
 from icha.cli.progress import Progress
-from icha.cli.project import list_campaigns, reports_errors
+from icha.cli.project import list_campaigns
 from icha.configuration.cases import campaign_sha256, run_cases
 from icha.configuration.load import load_configuration
 from icha.datasets.campaign_file import campaign_tree
-from icha.datasets.files import read_dataset, write_dataset
+from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import write_surface
 from icha.planning.costs import Cost
-from icha.planning.ownership import claim, find_conflict
 from icha.planning.plan import DONE, FAILED, OUTDATED, TO_DO, Item, plan, time_on
 from icha.planning.results import campaign_files, expected_stamps
-from icha.references.theories import reference_dataset
-from icha.support.formatting import format_quantity
-from icha.surfaces.shapes import Sphere
 from icha.surfaces.spectrum import SelfAffineSpectrum
 
 HEAVY = ["scipy", "pandas", "xarray", "matplotlib", "netCDF4", "snakemake"]
@@ -112,15 +104,6 @@ def test_user_errors_are_messages_and_status_2(project):
     assert printed("--version").startswith("icha ")
 
 
-def test_the_campaign_of_the_default_file_has_a_name(project):
-    for command in (["describe", "paper"], ["describe"]):
-        assert "configuration: config/config.yaml" in printed(*command)
-    assert "paper, " in output("describe", "nonsense", status=2)
-    Path("config/config.yaml").write_bytes(b"name: \xff")
-    output("describe", "paper", status=2)
-    output("describe", "smoke")
-
-
 @pytest.mark.parametrize(
     ("arguments", "without"),
     [
@@ -149,24 +132,6 @@ def test_a_new_campaign_is_valid(project, options):
     schema = file.parent / first.removeprefix("# yaml-language-server: $schema=")
     assert json.loads(schema.read_text())["$schema"]
     assert time_on(plan(campaign, project / "results/mine"), 2) < 60
-
-
-@pytest.mark.parametrize("results", ["results/mine", "mine"])
-def test_answers_before_the_campaign_has_run_are_missed_in_its_folder(results, project):
-    message = printed("answer", results, status=2)
-    assert "results/mine/aggregated/answers.nc: there are no answers" in message and "results/results" not in message
-
-
-def test_a_measured_surface_on_an_indenter_needs_only_the_radius(project):
-    write_scan("scan.txt", rough_heights(), "10 um")
-    written = printed("new", "lens", "--measured", "scan.txt", "--indenter")
-    assert written.count("to fill in: ") == 1 and "surfaces.scan.shape.sphere.radius (the radius" in written
-    assert "surfaces.scan.shape.sphere.radius: (empty)" in printed("describe", "lens", status=2)
-    file = CAMPAIGNS / "lens.yaml"
-    text = file.read_text().replace("{radius: }", "{radius: 10 um}").replace("1 um, 3 um", "1 nm")
-    file.write_text(text.replace("50 mJ/m^2", "0.5 mJ/m^2"))
-    surface = load_configuration(file).campaign.surfaces["scan"]
-    assert surface.boundary == "free" and surface.detrend == "curvature" and surface.shape.shape == Sphere(10e-6)
 
 
 def test_the_examples_in_the_comments_of_a_new_campaign_are_valid(project):
@@ -236,32 +201,6 @@ def test_a_text_is_shown_and_what_is_missing_is_asked(project):
     assert yaml.safe_load((CAMPAIGNS / "four.yaml").read_text())["surfaces"]["cloud"]["scattered"] is None
 
 
-def test_data_names_one_of_several_arrays_of_a_measured_file(project):
-    with h5py.File("my.h5", "w") as file:
-        for name in ("first", "second"):
-            file[name] = np.random.default_rng(1).normal(size=(16, 16))
-            file[name].attrs["units"] = "nm"
-    refused = printed("new", "two", "--measured", "my.h5", status=2)
-    assert "first, second" in refused and "--data NAME" in refused
-    output("new", "two", "--measured", "my.h5", "--data", "third", status=2)
-    assert "to fill in: surfaces.my.size" in output("new", "two", "--measured", "my.h5", "--data", "second")
-    file = CAMPAIGNS / "two.yaml"
-    text = file.read_text()
-    assert "It runs once the keys marked" in text and "lateral_unit" not in text
-    text = text.replace("size: ", "size: 16 um").replace("boundary: ", "boundary: free")
-    file.write_text(f"{text}confirmed: [surfaces.my.grid]\n")
-    assert load_configuration(file).campaign.surfaces["my"].data == "second"
-    with netCDF4.Dataset("my.nc", "w") as file:
-        file.createDimension("row", 64)
-        file.createDimension("column", 64)
-        for name in ("intensity", "z"):
-            file.createVariable(name, "f8", ("row", "column"))[:] = rough_heights() * 1e9
-            file[name].units = "nm"
-    # A usual name is taken, printed, and written into the configuration.
-    assert "read as netcdf, `data: z`, one of several" in printed("new", "mine", "--measured", "my.nc")
-    assert yaml.safe_load((CAMPAIGNS / "mine.yaml").read_text())["surfaces"]["my"]["data"] == "z"
-
-
 def write_scan(file, heights, side):
     """Write a scan as Gwyddion exports it: with size and units."""
     heading = ["# Channel: Z", f"# Width: {side}", f"# Height: {side}", "# Value units: m"]
@@ -272,39 +211,6 @@ def write_scan(file, heights, side):
 def rough_heights(noise=0.0, grid=64, side=10e-6):
     heights = SelfAffineSpectrum(side, side, side / 8, 0.8, rms_slope=0.1).realise(grid, 1).heights
     return heights + noise * np.random.default_rng(1).normal(size=heights.shape)
-
-
-def test_many_filled_points_and_edges_that_do_not_fit_are_reported(project):
-    heights = rough_heights()
-    heights[20:45, 10:40] = np.nan
-    write_scan("scan.txt", heights[:48, :48], "10 um")
-    written = printed("new", "mine", "--measured", "scan.txt")
-    assert "scan: read as matrix, heights of 750 points interpolated (33 % of all points)" in written
-    assert "opposite edges" not in written
-    assert "scan: warning: more than 5 % of the heights are interpolated" in written
-    file = CAMPAIGNS / "mine.yaml"
-    for boundary, warning in (("periodic", True), ("window", False)):
-        file.write_text(re.sub("boundary: .*", f"boundary: {boundary}  # to fill in", file.read_text()))
-        if boundary == "periodic":  # steps at the edges look like waves shorter than four cells
-            assert "surfaces.scan.grid: 48 is unusual" in printed("describe", "mine", status=2)
-            file.write_text(f"confirmed: [surfaces.scan.grid]\n{file.read_text()}")
-        described = printed("describe", "mine")
-        assert "interpolated (33 % of all points)" in described
-        assert ("warning: `boundary: periodic`, but opposite edges differ" in described) == warning
-
-
-@pytest.mark.parametrize("boundary", ["free", "window", "mirror", "periodic"])
-def test_only_the_boundary_of_a_complete_file_is_left_to_fill_in(project, boundary):
-    write_scan("scan.txt", rough_heights(), "10 um")
-    written = output("new", "mine", "--measured", "scan.txt")
-    assert written.count("to fill in: ") == 1 and "to correct" not in written
-    file = CAMPAIGNS / "mine.yaml"
-    text = file.read_text()
-    assert "It runs once the keys marked `to fill in` have values." in text
-    assert "surfaces.scan.boundary: (empty)" in printed("describe", "mine", status=2)
-    assert any(line.strip().startswith(f"#   {boundary}  ") for line in text.splitlines()), "no explanation"
-    file.write_text(text.replace("boundary: ", f"boundary: {boundary}"))
-    assert load_configuration(file).warnings == ()
 
 
 def test_a_scan_is_analysed_before_anything_is_computed(project):
@@ -335,29 +241,6 @@ def test_a_scan_is_analysed_before_anything_is_computed(project):
     # A filter of sixteen pixels leaves almost nothing of waves shorter than twice its length.
     file.write_text(re.sub(r"# cutoff: \S+ um", "cutoff: 2.5 um", text))
     assert "few grid cells" not in output("describe", "mine")
-
-
-def test_errors_of_the_system_are_messages_and_status_1(project):
-    shutil.rmtree(CAMPAIGNS)
-    CAMPAIGNS.write_text("a file where a folder is needed")
-    assert "config/campaigns: " in output("new", "mine", status=1)
-
-
-def test_unusual_values_are_refused_unless_they_are_confirmed(project):
-    text = TINY.replace("25 MPa", "25 mPa", 1)
-    Path("unusual.yaml").write_text(text)
-    key = "materials.bare.contact_modulus"
-    Path("wrong.yaml").write_text(TINY.replace("25 MPa", "25", 1).replace("grid: 32", "grid: 6"))
-    for command in ("describe", "run"):
-        refused = printed(command, "unusual.yaml", status=2)
-        assert re.search(rf"unusual\.yaml, line \d+: {key}: '25 mPa' is unusual", refused)
-        assert f"`confirmed: [{key}]`" in refused
-        # All errors are reported at once.
-        refused = printed(command, "wrong.yaml", status=2)
-        assert re.search(rf"wrong\.yaml, line \d+: {key}", refused) and "grid: 6" in refused
-    Path("unusual.yaml").write_text(f"{text}confirmed: [{key}]\n")
-    described = printed("describe", "unusual.yaml")
-    assert re.search(rf"Warning: unusual\.yaml, line \d+: {key}: '25 mPa' is unusual", described)
 
 
 @pytest.mark.parametrize(("licence", "accepted"), [("CC-BY", False), ("cc0-1.0", False), ("CC0-1.0", True)])
@@ -445,72 +328,12 @@ def test_results_of_another_file_of_the_same_name_are_not_changed(tiny, no_snake
     output("run", "copy.yaml", status=STARTED)
 
 
-def test_the_configuration_as_used_belongs_to_its_results(project):
-    results = project / "results/tiny"
-    results.mkdir(parents=True)
-    (results / "config.used.yaml").write_text(TINY)
-    claim(results, results / "config.used.yaml")
-    assert not (results / "belongs_to.txt").exists()
-    claim(results, project / "tiny.yaml")
-    claim(results, project / "copy.yaml")
-    assert (results / "belongs_to.txt").read_text() == "tiny.yaml\n"
-    assert find_conflict(results, results / "config.used.yaml") is None
-    assert find_conflict(results, project / "config/../tiny.yaml") is None
-
-
-def test_validity_of_the_models_is_printed_before_a_run(tiny, small_machine):
-    for text in (output("describe", "tiny.yaml"), output("run", "tiny.yaml", status=STARTED)):
-        assert all(f"{word}: " in text for word in ("models", "jump-in", "adhesion", "accuracy"))
-
-
-def test_checks_and_validity_are_printed_separately_after_a_run(tiny, capsys):
-    campaign, results = tiny
-    write_dataset(campaign_tree(small.runs()), results / "dataset/tiny.nc")
-    write_checks(check_campaign(small.tree()), results / "checks.json")
-    sys.modules["icha.cli.run"]._print_checks(campaign, results)
-    checks, _, *statements = capsys.readouterr().out.splitlines()
-    assert re.fullmatch(r"checks:  (\d+) of \1 checks of the solved equations passed", checks)
-    assert [line.partition(":")[0] for line in statements] == ["models", "adhesion", "jump-in", "accuracy"]
-    assert "asperities in slopes, single" in statements[0]
-
-
-def test_the_signal_that_killed_a_job_is_printed(tmp_path, capsys):
-    lines = ["Building DAG", "Command 'python …' died with <Signals.SIGKILL: 9>.", "[date]", "Error in rule run_0:"]
-    (tmp_path / "snakemake.log").write_text("\n".join([*lines, *(f"job {k}" for k in range(20))]))
-    progress = SimpleNamespace(start=0, finished={"a"})
-    run = sys.modules["icha.cli.run"]
-    assert run._print_reasons(tmp_path, tmp_path / "snakemake.log", 0, progress, stopped=False) == []
-    out = capsys.readouterr().out
-    assert out.startswith("Snakemake could not continue:\n") and "SIGKILL: 9" in out and "Error in rule run_0" in out
-
-
-def test_truncated_files_are_computed_again(tiny):
-    campaign, results = tiny
-    whole, cut, empty, _ = campaign_files(campaign).runs
-    write_results(campaign, results, [whole, cut, empty])
-    (results / cut).write_bytes((results / cut).read_bytes()[:-100])
-    (results / empty).write_bytes(b"")
-    found = states(campaign, results)
-    assert [found[path] for path in (whole, cut, empty)] == [DONE, OUTDATED, OUTDATED]
-    assert "outdated: 2 files, because it cannot be read: will be computed again" in printed("describe", "tiny.yaml")
-
-
 def test_a_campaign_too_large_for_the_machine_causes_a_warning(tiny, small_machine):
     assert "Warning: jobs on 2 cores need about" in printed("run", "tiny.yaml", status=STARTED)
     described = output("describe", "tiny.yaml")
     assert "too small: jobs on 2 cores need about" in described and "this machine has 1.05 MB" in described
     # A cluster does not use the memory of this machine.
     assert "Warning" not in output("run", "tiny.yaml", "--profile", "slurm", status=STARTED)
-
-
-def test_memory_that_the_system_refuses_is_a_message():
-    @reports_errors
-    def command():
-        raise MemoryError("Unable to allocate 80 GiB for an array")
-
-    with pytest.raises(typer.Exit) as end:
-        command()
-    assert end.value.exit_code == 1
 
 
 def test_all_files_are_checked_and_runs_are_shown(empty_folder):
@@ -527,41 +350,11 @@ def test_all_files_are_checked_and_runs_are_shown(empty_folder):
         assert words in checked
 
 
-def test_both_separations_of_a_free_square_are_shown(empty_folder):
-    run = small.run()
-    free = run.assign(boundary=run["boundary"].copy(data="free"), mean_gap=run["mean_separation"] + run["rms_height"])
-    write_dataset(free.assign(mean_gap=free["mean_gap"].assign_attrs(run["mean_gap"].attrs)), "free.nc")
-    shown = output("show", "free.nc")
-    numbers = {
-        line.split()[0]: float(re.findall(r"[\d.]+ µm", line)[0][:-3]) for line in shown.splitlines() if "µm" in line
-    }
-    assert numbers["mean_gap"] == pytest.approx(numbers["mean_separation"] + numbers["rms_height"], rel=0.01)
-
-
 def test_surfaces_and_campaigns_are_shown(empty_folder):
     write_surface("surface.nc", small.surface(), name="rough", seed=1, spectrum=small.SPECTRUM)
     write_dataset(small.tree(), "campaign.nc")
     assert re.search(r"hurst +0.8 +Hurst exponent H", output("show", "surface.nc"))
     assert "slopes: 1 model, 1 surface, 1 seed, 2 rms_slope, 2 material" in output("show", "campaign.nc")
-
-
-def test_scans_are_shown_as_measured(empty_folder):
-    write_surface("surface.nc", small.surface(), name="rough", seed=1)
-    surface = read_dataset("surface.nc")
-    write_dataset(surface.assign(measured_rms_slope=surface["rms_slope"] * 1e-3), "scan.nc")
-    height = format_quantity(1e-3 * float(surface["rms_height"]), "m")
-    shown = printed("show", "scan.nc")
-    measured = shown[shown.index("as measured") : shown.index("as stored")]
-    assert f"rms_height {height} rms height" in measured and "rms_slope 0.001 rms slope" in measured
-    assert "as measured" not in printed("show", "surface.nc")
-
-
-def test_results_without_checks_are_named(empty_folder):
-    write_dataset(reference_dataset(small.SPECTRUM), "theories.nc")
-    assert "theories.nc: theories and published points" in printed("check", "theories.nc")
-    assert "theories and published points" in printed("show", "theories.nc", status=2)
-    Path("deposit").mkdir()
-    assert "deposit: has no SHA256SUMS" in printed("check", "deposit", status=2)
 
 
 @pytest.fixture
@@ -611,15 +404,3 @@ def test_time_left_follows_the_times_of_files(progress, tmp_path, clock):
     assert left() == pytest.approx(before - 5, abs=1)
     clock.now += 1000
     assert progress.time_left() == "longer than expected"
-
-
-def test_a_new_campaign_of_a_scan_names_the_key_for_its_defect(project):
-    heights = np.random.default_rng(1).normal(size=(64, 64)).cumsum(axis=0).cumsum(axis=1) * 1e-9
-    heights[5, 7] += 100 * heights.std()
-    np.savetxt("spike.csv", heights, delimiter=",")
-    text = printed("new", "scanned", "--measured", "spike.csv")
-    assert "`outliers: remove`" in text and "pixels of" not in text
-    file = Path("config/campaigns/scanned.yaml")
-    assert "    # outliers: remove " in file.read_text()
-    errors = output("describe", "scanned", status=2)
-    assert all(f"surfaces.spike.{key}: (empty)" in errors for key in ("height_unit", "size", "boundary"))

@@ -98,6 +98,7 @@ def test_an_end_that_physics_decides_is_a_result(project):
     assert reasons.startswith("load/rough/seed1/slope1/sticky: the path ends at") and reasons.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_a_run_that_fails_leaves_a_dataset_and_is_listed_with_its_reason(project):
     # The snapshot is far above the surface.
     far = yaml.safe_load(TINY) | {"name": "far"}
@@ -211,21 +212,21 @@ def test_an_accuracy_is_reached_with_seeds_that_stay(tmp_path):
 
 
 # At the end of a run: one run of boundary elements fails a check.
-FAIL = """    if seed == 2 and model != DEFAULT_MODEL and "coarse" not in attributes["study"]:
+FAIL = """    if seed == 2:
         dataset = dataset.assign_attrs(failed_checks="residual: 1.12e-08 (largest error); expected at most 1e-08")
 """
 FIGURE = "figures: {fig2_area_and_gap: {study: load}}\n"
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seeds", ["accuracy: 30 %", "seeds: [1, 2, 3]\n    models: [boundary_elements]"])
-def test_one_failed_run_leaves_figures_report_and_answers_which_count_it(tmp_path, seeds):
+def test_one_failed_run_leaves_figures_report_and_answers_which_count_it(tmp_path):
     project = copy_project(REPOSITORY, tmp_path / "project")
     script = project / "icha/tasks/run.py"
     end = "    write_dataset(dataset.assign_attrs(attributes), output)"
     assert script.read_text().count(end) == 1
     script.write_text(script.read_text().replace(end, FAIL + end))
-    asked = TINY.replace("grid: 32", "grid: 40").replace("[bare, soft]", "[bare]").replace("seeds: [1, 2]", seeds)
+    asked = TINY.replace("grid: 32", "grid: 40").replace("[bare, soft]", "[bare]")
+    asked = asked.replace("seeds: [1, 2]", "seeds: [1, 2, 3]\n    models: [boundary_elements]")
     (project / "config/campaigns/tiny.yaml").write_text(asked + FIGURE)
     output = run(project, status=1)
     results = project / "results/tiny"
@@ -238,6 +239,3 @@ def test_one_failed_run_leaves_figures_report_and_answers_which_count_it(tmp_pat
     assert all(" seeds of boundary elements; 1 failed a check" in each for each in words)
     assert "1 failed a check" in (results / "figures/fig2_area_and_gap.txt").read_text()
     assert "1 failed a check" in (results / "report.html").read_text()
-    if "accuracy" in seeds:
-        assert (results / "levels.yaml").is_file()
-        assert "(30 % required); " in output.splitlines()[-1] and words[0] in output.splitlines()[-1]

@@ -1,10 +1,13 @@
-"""Files of configurations: invalid files, overrides, all problems at once."""
+"""Files of configurations: invalid files and values, overrides, all problems at once; section `publication`."""
 
+import datetime
 import re
 from datetime import date
+from pathlib import Path
 
 import pytest
-from demo_configuration import GOOD, measured_surface
+import yaml
+from demo_configuration import CARBERRY, GOOD, ORCID, REPOSITORY, measured_surface
 
 from icha.configuration.errors import ConfigurationError
 from icha.configuration.load import load_configuration
@@ -15,12 +18,6 @@ def test_all_problems_are_reported_at_once(load):
     with pytest.raises(ConfigurationError) as error:
         load({"name": "A B", "surfaces.rough.hurst": 2, "materials.soft.surface_energy": "1 m", "extra": 1})
     assert len(str(error.value).splitlines()) == 4
-
-
-def test_overrides_are_checked(load):
-    assert load(overrides={"surfaces": {"rough": {"hurst": 0.5}}}).campaign.surfaces["rough"].hurst == 0.5
-    with pytest.raises(ConfigurationError, match=r"with --config: surfaces\.rough\.hurst: 5 is out of range"):
-        load(overrides={"surfaces": {"rough": {"hurst": 5}}})
 
 
 def test_messages_name_the_line_and_the_value_as_written(tmp_path):
@@ -55,11 +52,8 @@ def test_overrides_are_part_of_the_configuration_as_used(load, tmp_path):
     ("content", "message"),
     [
         (b"", "the file is empty"),
-        (b"- 1\n", "the file is a list"),
-        (b"a: [1\n", "expected a YAML mapping"),
         (b"m:\n  x: {k: 1, k: 2}\n", "line 2: key 'k' is given twice"),
         (b"\xff\xfea\x00", "line 1: is not UTF-8; expected a YAML file saved in UTF-8"),
-        (b"a\0b", "line 1: control character 0x00; expected a YAML mapping"),
         ("a: 1\ntitle: Gerät\n".encode("latin-1"), "line 2: is not UTF-8"),
         (b"a: 1\nb: \x07\n", "line 2: control character 0x07; expected a YAML mapping"),
         (b"a: !!python/object:os.system {}\n", "expected a YAML mapping"),
@@ -115,3 +109,44 @@ def test_slopes_of_scans_are_compared_once_they_are_known(load):
     assert load({**measured, "publication": {"known_failures": failures}})
     with pytest.raises(ConfigurationError, match=r"rms_slope: 0.5 is not in study 'one'"):
         load({**measured, "figures": {"fig4_contact_map": {"study": "one", "rms_slope": 0.5}}})
+
+
+_TEXT = (Path(__file__).parent / "refusals.yaml").read_text(encoding="utf-8")
+CASES = yaml.safe_load(_TEXT.replace("SCAN", str(REPOSITORY / "config/topographies/synthetic_scan.txt")))
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case["message"].replace(" ", "_")[:70])
+def test_wrong_configurations_are_refused(case, refused):
+    refused("", case["changes"], case["message"])
+
+
+@pytest.mark.parametrize("ror", ["03yrm5c26", "05gq02987", "00k4n6c32", "01bj3aw27", "02mhbdp94"])
+def test_identifiers_of_real_institutions_have_their_check_digits(ror, load):
+    written = (ror, f"http://ror.org/{ror}", f"https://ror.org/{ror.upper()}")
+    authors = [{"name": str(number), "ror": each} for number, each in enumerate(written)]
+    funding = [{"funder": str(number), "funder_id": each, "award_number": each} for number, each in enumerate(written)]
+    publication = load({"publication": {"authors": authors, "funding": funding}}).campaign.publication
+    found = {each.ror for each in publication.authors} | {each.funder_id for each in publication.funding}
+    assert found == {f"https://ror.org/{ror}"}
+
+
+def test_what_differs_may_stand_side_by_side(load):
+    others = [{"funder": "A"}, {"funder": "A", "award_number": "1"}, {"funder": "A", "award_number": "2"}]
+    paper = {"identifier": "10.1000/abc"}
+    publication = {
+        # Two of one name.
+        "authors": [CARBERRY | {"orcid": ORCID}, CARBERRY | {"orcid": "0000-0001-5109-3700"}, {"name": "Carberry"}],
+        "funding": [*others, {"funder": "B", "funder_id": "https://doi.org/10.13039/501100000780"}],
+        "related_identifiers": [paper | {"relation": "Cites"}, paper | {"relation": "IsSupplementTo"}],
+        "summary": "One\n\ntwo",
+    }
+    found = load({"publication": publication}).campaign.publication
+    assert len(found.authors) == 3 and len(found.related_identifiers) == 2
+    assert found.funding[-1].funder_id == "10.13039/501100000780"
+
+
+def test_days_of_the_command_line(load):
+    day = datetime.date(2026, 1, 31)
+    assert load(overrides={"publication": {"date": day}}).campaign.publication.date == "2026-01-31"
+    with pytest.raises(ConfigurationError, match=r"publication\.date: .* is not valid; expected "):
+        load(overrides={"publication": {"date": datetime.datetime(2026, 1, 31, 12)}})

@@ -100,13 +100,6 @@ def test_scripts_are_refused_before_anything_is_computed(load, text, message, tm
         load({"figures": {"mine": {"study": "one", "script": "mine.py"}}})
 
 
-def test_a_module_that_is_not_python_is_refused(load, tmp_path):
-    (tmp_path / "mine.py").write_text(f"import labels\n{AREAS}")
-    (tmp_path / "labels.py").write_text("AREA = \n")
-    with pytest.raises(ValueError, match=r"figures.mine.script: .* is not a Python file: .*labels.py, line 1"):
-        load({"figures": {"mine": {"study": "one", "script": "mine.py"}}})
-
-
 def test_names_of_own_figures(load, tmp_path):
     (tmp_path / "mine.py").write_text(AREAS)
     entry = {"study": "one", "script": "mine.py"}

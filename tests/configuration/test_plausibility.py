@@ -2,9 +2,8 @@
 
 import re
 
-import numpy as np
 import pytest
-from demo_configuration import file_surface, measured_surface
+from demo_configuration import measured_surface
 
 from icha.configuration.cases import run_cases
 from icha.configuration.errors import ConfigurationError
@@ -60,12 +59,6 @@ def test_unusual_values_are_found_wherever_values_are_written(load, refused, tmp
         load(overrides={"materials": {"soft": {"contact_modulus": "25 mPa"}}})
 
 
-def test_all_unusual_values_and_other_problems_of_the_design_are_named_at_once(load):
-    with pytest.raises(ConfigurationError) as error:
-        load({"materials.soft.contact_modulus": "2 mPa", "studies.one.rms_slopes": [500, 1e-6]})
-    assert len(str(error.value).splitlines()) == 3
-
-
 STICKY = {"materials.soft.contact_modulus": "50 kPa"}
 
 
@@ -81,16 +74,6 @@ def test_sticky_runs_of_asperities_are_refused_until_they_are_confirmed(load, re
     assert message.replace("; expected", ", but confirmed; expected") in warning
     assert load({**STICKY, **ANY_STICKINESS}).warnings == ()
     assert load({**STICKY, "materials.soft.surface_energy": "0 J/m^2"}).warnings == ()
-
-
-def test_sticky_runs_on_surfaces_from_files_are_found_too(load, refused, tmp_path):
-    scan = {"surfaces.rough": measured_surface()}
-    load(scan)
-    refused("", scan | STICKY, "is unusual for soft on rough at rms slope 0.2; expected 1 to inf")
-    np.save(tmp_path / "heights.npy", np.random.default_rng(1).normal(size=(16, 16)))
-    periodic = {"surfaces.rough": file_surface(tmp_path / "heights.npy"), "confirmed": ["surfaces.rough.path"]}
-    load({**periodic, "materials.soft.surface_energy": "0 J/m^2"})
-    refused("", {**periodic, "materials.soft.contact_modulus": "1 kPa"}, "studies.one.models: 'asperities with U_full")
 
 
 def test_on_sticky_surfaces_boundary_elements_alone_reach_an_accuracy(load, refused):

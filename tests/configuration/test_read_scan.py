@@ -103,15 +103,6 @@ def test_periodic_surfaces_give_no_warning(grid, cells, roll_off, hurst):
         icha.Surface(rough(grid, PERIOD / roll_off, cells, hurst, seed), PERIOD)
 
 
-@pytest.mark.filterwarnings("error")
-def test_white_noise_and_domes_give_no_warning():
-    for seed in range(50):
-        icha.Surface(0.1 * np.random.default_rng(seed).normal(size=(8, 8)), 1.0)
-    x = np.arange(64)
-    dome = -((x[:, None] - 32) ** 2 + (x - 32.0) ** 2) / 1000
-    icha.Surface(np.roll(dome, (13, 40), (0, 1)) / 64, 1.0)
-
-
 @pytest.mark.parametrize("cells", [4, 8])
 def test_tilted_and_cropped_scans_give_a_warning(cells):
     tilt = 0.05 * PERIOD * np.arange(64) / 64
@@ -125,11 +116,6 @@ def test_tilted_and_cropped_scans_give_a_warning(cells):
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             icha.Surface(part, PERIOD, "free")
-
-
-def test_a_scan_that_is_not_periodic_gives_a_warning(file):
-    with pytest.warns(icha.IchaWarning, match="step at the edges"):
-        icha.read_scan(file, **KEYS, boundary="periodic")
 
 
 @pytest.mark.parametrize(("share", "asked"), [(0.0015, ""), (0.01, "0.98 %"), (0.3, "30 %")])
@@ -149,20 +135,3 @@ def test_a_number_at_many_points_may_mark_missing_points(tmp_path, share, asked)
         with pytest.raises(ValueError, match=f"missing: '{asked} of the points at exactly 0 m' is unusual"):
             icha.read_scan(tmp_path / "scan.npy", **keys)
         assert icha.read_scan(tmp_path / "scan.npy", **keys | {"confirmed": ["height_unit", "missing"]}).grid == 64
-
-
-@pytest.mark.filterwarnings("error")
-def test_infinite_heights_are_missing_without_warnings(tmp_path):
-    heights = rough() * 1e9
-    heights[10:12, 20:25] = np.inf
-    np.save(tmp_path / "scan.npy", heights)
-    assert np.isfinite(icha.read_scan(tmp_path / "scan.npy", **KEYS, boundary="free", missing="fill").heights).all()
-
-
-def test_rounded_coordinates_ask_for_interpolation(tmp_path):
-    x, y = (np.round(0.126 * each, 1).ravel() for each in np.meshgrid(np.arange(64), np.arange(64)))
-    np.savetxt(tmp_path / "scan.xyz", np.column_stack([x, y, rough().ravel() * 1e9]))
-    keys = {"lateral_unit": "um", "height_unit": "nm", "boundary": "free"}
-    with pytest.raises(ValueError, match=r"scattered: .* lack whole rows or columns, .*; expected interpolate"):
-        icha.read_scan(tmp_path / "scan.xyz", **keys)
-    assert icha.read_scan(tmp_path / "scan.xyz", **keys, scattered="interpolate").grid > 60

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from demo_configuration import file_surface, measured_surface
 
-from icha.configuration.errors import ConfigurationError
 from icha.planning.validity import expected_validity
 from icha.surfaces.spectrum import SelfAffineSpectrum
 
@@ -44,20 +43,6 @@ def test_random_surfaces(models, load, refused):
     found = stated(load(changes | {"surfaces.rough.grid": 48}))
     assert ("grid" in found) == (models == ["boundary_elements"])
     assert "grid" not in stated(load(changes | {"surfaces.rough.grid": 80}))
-
-
-def test_tables_of_spectra(load, refused, tmp_path):
-    q = np.geomspace(2 * np.pi / 100e-6, 2 * np.pi / 10e-6, 50)
-    np.savetxt(tmp_path / "table.txt", np.column_stack([q, 1e-30 * (q / q[0]) ** -3.6]))
-    section = {"kind": "spectrum", "path": "table.txt", "period": "100 um", "grid": 30}
-    found = confirmed(
-        load,
-        refused,
-        BARE | {"surfaces.rough": section},
-        "surfaces.rough.grid: 30 is unusual (3 cells per shortest wave); expected a grid of at least 40 nodes",
-        "surfaces.rough.grid",
-    )
-    assert not found["grid"].good
 
 
 @pytest.mark.parametrize("measured", [False, True])
@@ -139,8 +124,3 @@ def test_long_ranges_of_boundary_elements(load, refused):
     rough = {"materials.soft.interaction_range": "60 nm", "studies.one.models": ["boundary_elements"]}
     refused("", rough, "materials.soft.interaction_range: '60 nm' is unusual for boundary elements of soft on rough")
     load(rough | {"studies.one.models": ["asperities"]})
-
-
-def test_a_coarse_contact_is_no_reason_to_refuse_the_asperity_model_of_other_studies(load):
-    with pytest.raises(ConfigurationError, match=r"studies\.one\.targets\.forces"):
-        load(BARE | smooth({"sphere": {"radius": "1 mm"}}, forces=["1 nN"]))

@@ -1,14 +1,14 @@
-"""The campaigns that are part of the project."""
+"""The campaigns, the schema and the tables of keys that are part of the project."""
 
 import numpy as np
 import pytest
 from demo_configuration import REPOSITORY
 
-from icha.configuration.cases import run_cases, run_settings, surface_cases
+from icha.configuration.cases import run_cases
 from icha.configuration.load import load_configuration
-from icha.contact.models import DEFAULT_MODEL
-from icha.planning.results import campaign_files
+from icha.configuration.schema import json_schema, readme_with_tables
 from icha.references.theories import literature
+from icha.support.values import Section
 
 SHIPPED = sorted([REPOSITORY / "config/config.yaml", *(REPOSITORY / "config/campaigns").glob("*.yaml")])
 
@@ -22,27 +22,6 @@ def test_shipped_campaigns_are_valid(path):
     confirmed = [warning.split(": ")[1] for warning in configuration.warnings]
     assert confirmed == campaign.confirmed
     assert path.name == "config.yaml" or campaign.name == path.stem
-
-
-def test_the_papers_campaign():
-    campaign = load_configuration(REPOSITORY / "config/config.yaml").campaign
-    assert campaign.name == "paper"
-    asperities = [case for case in run_cases(campaign) if case.model == DEFAULT_MODEL]
-    assert len(asperities) == 2 + 9 + 12
-    assert [(name, seed) for name, seed in surface_cases(campaign) if seed == 1][:2] == [
-        ("challenge", 1),
-        ("mcghee", 1),
-    ]
-    assert campaign.resolution("challenge").cells == pytest.approx(8)
-    ratios = [m.surface_energy / m.contact_modulus for m in campaign.materials.values()][2:]
-    assert ratios == pytest.approx([8.333e-9, 4.0e-9, 1.905e-9], rel=1e-3)
-    # Boundary elements solve the paper's material, and none, at the same loads with the same snapshots.
-    compared = [case for case in campaign_files(campaign).compared.values() if case.study == "challenge"]
-    assert {campaign.materials[case.material].surface_energy for case in compared} == {0.05, 0.0}
-    for case in compared:
-        path = run_settings(campaign, case)["path"]
-        assert path == run_settings(campaign, case._replace(model=DEFAULT_MODEL))["path"]
-        assert path["snapshots"] == [("reduced_pressure", p) for p in path["reduced_pressures"]]
 
 
 def test_the_whole_challenge():
@@ -76,3 +55,21 @@ def test_tabor_parameters_of_the_tabor_campaign():
             assert float(name.removeprefix("mu_").replace("_", ".")) == pytest.approx(mu, rel=2e-3)
             found.append(mu)
     np.testing.assert_allclose(found, np.arange(1, 5.1, 0.5), rtol=2e-3)
+
+
+def test_schema_and_tables_are_those_of_the_model():
+    advice = "out of date: run `make schema`"
+    assert (REPOSITORY / "workflow/schemas/config.schema.json").read_text(encoding="utf-8") == json_schema(), advice
+    readme = (REPOSITORY / "config/README.md").read_text(encoding="utf-8")
+    assert readme == readme_with_tables(readme), advice
+
+
+def test_every_key_is_described():
+    def sections(kind):
+        yield kind
+        for child in kind.__subclasses__():
+            yield from sections(child)
+
+    for section in sections(Section):
+        for key, field in section.model_fields.items():
+            assert field.description, f"{section.__name__}.{key}"

@@ -1,12 +1,14 @@
-"""Section `surfaces`: random ones, and those of files."""
+"""Section `surfaces`: random ones, those of files, and measured ones."""
 
 import numpy as np
 import pytest
-from demo_configuration import file_surface
+from demo_configuration import file_surface, measured_surface
 
 from icha.configuration.cases import run_cases, surface_cases, surface_settings
 from icha.configuration.errors import ConfigurationError
+from icha.configuration.surfaces import MeasuredSurface
 from icha.datasets.labels import number_label
+from icha.surfaces.measured.settings import Preparation
 from icha.surfaces.spectrum import SelfAffineSpectrum
 from icha.surfaces.tabulated_spectrum import SpectrumTable
 
@@ -76,3 +78,34 @@ def test_surfaces_with_a_tabulated_spectrum_have_seeds_and_the_slope_of_their_ta
     (tmp_path / "wrong.txt").write_text("1 2\nthree 4\n", encoding="utf-8")
     refused("", changes | {"surfaces.rough": section | {"path": "wrong.txt"}}, "surfaces.rough.path: '")
     refused("", changes | {"surfaces.rough": section | {"grid": 16}}, "cells per shortest wave; expected at least")
+
+
+SECTION = {"kind": "measured", "path": "scan.npy", "boundary": "mirror", "height_unit": "nm", "size": "90 um"}
+
+
+def test_section_in_si_units():
+    section = MeasuredSurface.model_validate(
+        SECTION
+        | {"height_unit": "0.1 mm", "size": ["90 um", "60 um"], "crop": {"x": "0 um", "y": "5 um", "side": "40 um"}}
+    )
+    how = section.preparation
+    assert how["height_unit"] == 1e-4 and how["size"] == (9e-5, 6e-5)
+    assert how["crop"] == {"x": 0.0, "y": 5e-6, "side": 4e-5}
+    assert how["detrend"] == "tilt" and how["taper"] is None
+    # Without a cut-off a surface has the checksum that it had before there was one.
+    assert "cutoff" not in how
+    assert Preparation(**how).missing == "refuse"
+    assert MeasuredSurface.model_validate(SECTION | {"boundary": "periodic"}).preparation["detrend"] == "none"
+    assert MeasuredSurface.model_validate(SECTION | {"boundary": "window"}).preparation["taper"] == 0.1
+
+
+def test_slopes_that_no_surface_has_are_to_be_confirmed(load, refused):
+    changes = {"surfaces.rough": measured_surface(height_unit="um"), "studies.one.rms_slopes": "measured"}
+    key = "surfaces.rough.height_unit"
+    refused(
+        "",
+        changes,
+        f"{key}: 'rms slope 146' is unusual (the slope depends on units, size and numbers for missing points); ",
+    )
+    (warning,) = load(changes | {"confirmed": [key]}).warnings
+    assert f"{key}: 'rms slope 146' is unusual" in warning and "but confirmed; expected 1e-4 to 5" in warning

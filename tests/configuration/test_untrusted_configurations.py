@@ -24,9 +24,7 @@ MERGED = "a0: &a0 {k: 1}\n" + "".join(f"a{i}: &a{i} {{<<: [{', '.join([f'*a{i - 
         (ALIASES, "the file has more than 1000000 values, with aliases and defaults expanded"),
         (MERGED, "the key <<; write values that several entries share"),
         ("studies: {one: {vary: {hurst: &a [*a]}}}", "more than 50 nested sections or lists"),
-        ("a: " + "[" * 5000 + "]" * 5000, "more than 50 nested sections or lists"),
         ("a: " + "{a: " * 5000, "more than 50 nested sections or lists"),
-        ("? " * 3000, "more than 50 nested sections or lists"),
         ("a: " + "x" * 10**6, "is longer than 1 MB"),
     ],
 )
@@ -42,16 +40,6 @@ def test_thousands_of_cases_are_read_and_aliases_count_as_what_they_stand_for(tm
     assert len(read_yaml(tmp_path / "one.yaml")["a"]) == 20_000
     (tmp_path / "two.yaml").write_text("a: [&b {seed: 1}" + ", *b" * 2000 + "]")
     assert read_yaml(tmp_path / "two.yaml")["a"] == [{"seed": 1}] * 2001
-
-
-def test_a_copy_for_the_results_that_would_be_too_long_is_refused(tmp_path):
-    authors = ", ".join(f"{{family_names: A{k}, given_names: *b}}" for k in range(999))
-    text = f"{GOOD}publication: {{authors: [{{family_names: A, given_names: &b {'b' * 1000}}}, {authors}]}}\n"
-    (tmp_path / "long.yaml").write_text(text)
-    with pytest.raises(
-        ConfigurationError, match=r"long\.yaml: .* with a line for each value.* longer than 1 MB; expected"
-    ):
-        load_configuration(tmp_path / "long.yaml")
 
 
 @pytest.mark.parametrize(
@@ -71,13 +59,6 @@ def test_keys_that_are_not_text_are_refused_by_their_line(key, tmp_path):
     (tmp_path / "one.yaml").write_text(GOOD.replace("  rough:", f"  {key}:"))
     with pytest.raises(ConfigurationError, match=r"one\.yaml, line 7: key .+ is not text; use quotes"):
         load_configuration(tmp_path / "one.yaml")
-
-
-def test_kinds_that_are_not_text_are_refused_with_defaults_as_without(refused):
-    surface = yaml.safe_load(GOOD)["surfaces"]["rough"]
-    for kind in (["self_affine"], {"a": 1}, "none"):
-        wrong = {"defaults": {"surfaces": {"hurst": 0.8}}, "surfaces.rough": surface | {"kind": kind}}
-        refused(None, wrong, f"surfaces.rough.kind: {kind!r} is not a kind of surface; expected one of ")
 
 
 def test_messages_have_no_control_characters(load):
@@ -144,46 +125,11 @@ def test_values_that_would_take_too_long_or_fail_late(case, refused):
     refused(None if value is None else key, key if value is None else value, message)
 
 
-def test_values_to_vary_make_names_that_files_can_have(refused):
-    varied = {
-        "period": ["100.123456789012345 um"],
-        "rolloff_wavelength": ["21.123456789012345 um"],
-        "short_wavelength": ["10.123456789012345 um"],
-        "hurst": [0.123456789012345],
-    }
-    surface = "r" * 80
-    changes = {
-        "surfaces": {surface: yaml.safe_load(GOOD)["surfaces"]["rough"]},
-        "studies.one.surfaces": [surface],
-        "studies.one.vary": varied,
-    }
-    refused(None, changes, "at most 200 characters")
-
-
 def test_of_a_thousand_problems_the_first_are_reported(load):
     with pytest.raises(ConfigurationError) as error:
         load({f"key{i}": 1 for i in range(1000)} | {"studies.one.surfaces": [f"none{i}" for i in range(1000)]})
     lines = str(error.value).splitlines()
     assert len(lines) == MOST_PROBLEMS + 1 and lines[-1].endswith("there are more problems; correct these first")
-
-
-def test_thousands_of_targets_snapshots_and_seeds_are_planned(load, tmp_path):
-    """Comparing all pairs would take 10^8 comparisons."""
-    study = {
-        "studies.one.targets": {"reduced_pressures": [1e-3 + 1e-6 * i for i in range(5_000)]},
-        "studies.one.snapshots": "every_stop",
-        "studies.one.unload": True,
-    }
-    assert len(plan(load(study).campaign, tmp_path)) > 0
-
-
-@pytest.mark.parametrize(
-    ("unit", "size"), [("1e-300 m", "64 um"), ("1e300 m", "64 um"), ("yottam*yottam/m", "64 um"), ("nm", "1e300 m")]
-)
-def test_scans_of_absurd_units_and_sizes_are_refused(unit, size, load):
-    changes = {"surfaces.rough": measured_surface(height_unit=unit, size=size), "studies.one.rms_slopes": "measured"}
-    with pytest.raises(ConfigurationError, match=r"surfaces\.rough\.(height_unit|size|path)\S*: .*; expected "):
-        load(changes)
 
 
 # What hypothesis puts in the place of values of configurations that come with ICHA.

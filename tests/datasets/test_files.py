@@ -7,9 +7,8 @@ import pytest
 import small_campaign as small
 import xarray as xr
 
-from icha import Surface
 from icha.datasets import files
-from icha.datasets.campaign import run_labels, select_run
+from icha.datasets.campaign import select_run
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import read_campaign, read_dataset, read_run, write_dataset
 from icha.datasets.labels import LABELS
@@ -65,15 +64,6 @@ def test_damaged_files_are_named(tmp_path, damage):
         read_run(path)
 
 
-@pytest.mark.parametrize(
-    ("read", "name", "message"), [(read_surface, "x", "not a surface file"), (read_dataset, "y", "no such file")]
-)
-def test_files_that_are_something_else_are_named(tmp_path, read, name, message):
-    write_dataset(simple(), tmp_path / "x")
-    with pytest.raises(ValueError, match=message):
-        read(tmp_path / name)
-
-
 def test_surface_round_trip_keeps_heights_and_axes(tmp_path):
     surface = small.surface()
     write_surface(tmp_path / "s.nc", surface, name="rough", seed=1, spectrum=small.SPECTRUM)
@@ -85,21 +75,6 @@ def test_surface_round_trip_keeps_heights_and_axes(tmp_path):
     assert dataset["height"].dims == ("y", "x")
     assert float(dataset["hurst"]) == 0.8
     np.testing.assert_allclose(float(dataset["rms_slope"]), 1.0, rtol=1e-12)
-
-
-def test_heights_of_a_large_surface_are_kept_plain_and_to_the_last_bit(tmp_path):
-    n = 2048
-    surface = Surface(np.random.default_rng(0).normal(size=(n, n)), 1.0)
-    for name in ("one.nc", "two.nc"):
-        write_surface(tmp_path / name, surface, name="rough", seed=1)
-    assert (tmp_path / "one.nc").read_bytes() == (tmp_path / "two.nc").read_bytes()
-    with netCDF4.Dataset(tmp_path / "one.nc") as file:
-        assert not file["height"].filters()["zlib"]
-        assert file["height"].chunking() == "contiguous"
-        np.testing.assert_array_equal(file["height"][::97], surface.heights[::97])
-    write_surface(tmp_path / "small.nc", small.surface(), name="rough", seed=1)
-    with netCDF4.Dataset(tmp_path / "small.nc") as file:
-        assert file["height"].filters()["zlib"] == (small.surface().grid >= 32)
 
 
 def test_every_run_can_be_taken_out_unchanged():
@@ -135,34 +110,6 @@ def test_a_run_with_failed_checks_keeps_its_values_and_reasons(tmp_path):
     status = np.array(tree["slopes"]["status"].attrs["flag_meanings"].split())[tree["slopes"]["status"].values]
     assert sorted(set(status.flat) - {"not_in_design"}) == ["complete", "failed_checks"]
     np.testing.assert_array_equal(taken["contact_area_fraction"].values, run["contact_area_fraction"].values)
-
-
-def test_combinations_that_nobody_asked_for_are_not_in_the_design(tmp_path):
-    """A design along its diagonal: two slopes and two materials, of which two runs are asked for and one is there."""
-    asked = {labels: run for labels, run in small.runs() if labels.study == "slopes"}
-    steep, other = (
-        labels for labels in asked if (labels.rms_slope, labels.material) in ((1.0, "soft"), (0.2, "hertz"))
-    )
-    write_dataset(campaign_tree([(steep, asked[steep])], design=[steep, other]), tmp_path / "c.nc")
-    tree = read_campaign(tmp_path / "c.nc")
-    status = tree["slopes"]["status"]
-    assert status.attrs["flag_meanings"] == (
-        "complete incomplete missing not_in_design failed_checks beyond_the_model failed_loss_checks"
-    )
-    table = np.array(status.attrs["flag_meanings"].split())[status.values]
-    assert status["rms_slope"].values.tolist() == [0.2, 1.0] and status["material"].values.tolist() == ["soft", "hertz"]
-    assert table.tolist() == [[[[["not_in_design", "missing"], ["complete", "not_in_design"]]]]]
-    area = tree["slopes"]["contact_area_fraction"]
-    assert int(np.isnan(area).sum()) == 3 * area.sizes["step"]
-    assert set(tree["slopes"]["failure"].values.flat) == {""}
-    assert run_labels(tree) == [steep]
-    with pytest.raises(ValueError, match=r"slopes/rough/seed1/slope0\.2/hertz: this run is missing"):
-        select_run(tree, other)
-    with pytest.raises(ValueError, match=r"slopes/rough/seed1/slope1/hertz: this run is not in the design"):
-        select_run(tree, steep._replace(material="hertz"))
-    kept = select_run(tree, steep)
-    np.testing.assert_array_equal(kept["spot_count"].values, asked[steep]["spot_count"].values)
-    np.testing.assert_array_equal(kept["spot_force"].values, asked[steep]["spot_force"].values)
 
 
 def test_runs_may_come_as_files_in_any_order(tmp_path):
@@ -266,12 +213,6 @@ def test_a_hole_before_the_padding_is_refused(tmp_path):
     tree["loops"]["work"].values[..., -1] = np.inf
     with pytest.raises(ValueError, match="'work' holds"):
         write_dataset(tree, tmp_path / "c.nc")
-
-
-def test_runs_without_events_are_taken_out():
-    labels, run = next(iter(cyclic.runs().items()))
-    without = campaign_tree([(labels, run.isel(event=slice(0, 0)))])
-    assert select_run(without, labels).sizes["event"] == 0
 
 
 def test_a_run_that_broke_off_on_its_way_back_has_no_pull_off(tmp_path):

@@ -1,4 +1,4 @@
-"""The documented format: what the program writes keeps to it, and what is changed is found."""
+"""The documented format: what the program writes keeps to it, and what is changed is found; stamps."""
 
 import re
 from pathlib import Path
@@ -9,9 +9,21 @@ import small_campaign as small
 import xarray as xr
 
 from icha.analysis.checks import check_campaign
-from icha.datasets.files import write_dataset
+from icha.datasets.files import read_run, write_dataset
 from icha.datasets.format import CAMPAIGN, RUN, SURFACE, UnknownFile, identify_file, problems_with_file
+from icha.datasets.quantities import _QUANTITIES
+from icha.datasets.stamp import (
+    DAMAGED,
+    OTHER_LICENCE,
+    OTHER_PROGRAM,
+    OTHER_SETTINGS,
+    outdated,
+    read_stamp,
+    refuse_outdated,
+    state_licence,
+)
 from icha.datasets.surface_file import write_surface
+from icha.datasets.variables import campaign, model_error, run, sensitivity
 from icha.datasets.variables import run as of_run
 from icha.datasets.variables import surface as of_surface
 
@@ -58,15 +70,12 @@ def changed(run, name, **attrs):
     ("spoil", "problem"),
     [
         (lambda run: run.drop_vars("residual"), "residual is missing"),
-        (lambda run: run.drop_vars("spot_force"), "spot_force is missing"),
         (lambda run: changed(run, "nominal_pressure", units="kPa"), "nominal_pressure: has the units 'kPa'"),
-        (lambda run: run.assign(period=run["period"].expand_dims("other")), "period: has the dimensions"),
         (lambda run: run.assign(reduced_pressure=run["reduced_pressure"] * (1 + 1e-6)), "reduced_pressure: differs"),
         (lambda run: run.assign(contact_area_fraction=run["contact_area_fraction"] + 1), "out of range"),
         (lambda run: run.assign(spot_snapshot=run["spot_snapshot"] + 5), "spot_snapshot: 5 is out of range"),
         (lambda run: run.assign(gap_bin_edges=run["gap_bin_edges"][::-1]), "gap_bin_edges: the edges do not increase"),
         (lambda run: run.assign_attrs(hostname="here"), "attribute hostname: states by whom"),
-        (lambda run: run.assign_attrs(date_created="2026-01-31"), "attribute date_created: states by whom"),
         (lambda run: run.assign(extra=xr.Variable((), 1.0)), "extra: has no attribute units"),
         (lambda run: run.assign(rms_height=run["rms_height"] * np.nan), "rms_height: 1 of 1 values are not finite"),
     ],
@@ -104,3 +113,74 @@ def test_other_files_are_refused(tmp_path):
     ):
         with pytest.raises(UnknownFile, match=message):
             identify_file(tmp_path / name)
+
+
+STAMP = {"id": "c/runs/é", "license": "CC0-1.0", "config_sha256": "a" * 64, "program_sha256": "b" * 64}
+
+
+@pytest.fixture
+def file(tmp_path):
+    (_, run), *_ = small.runs()
+    write_dataset(run.assign_attrs(STAMP), tmp_path / "run.nc")
+    return str(tmp_path / "run.nc")
+
+
+def cut_off(file):
+    with open(file, "r+b") as content:
+        content.truncate(3000)
+
+
+def replace_by_text(file):
+    with open(file, "w") as content:
+        content.write("not a netCDF file")
+
+
+@pytest.mark.parametrize(
+    ("expected", "damage", "reason"),
+    [
+        ({}, None, None),
+        ({"config_sha256": "0" * 64}, None, OTHER_SETTINGS),
+        ({"config_sha256": "0" * 64, "program_sha256": "0" * 64}, None, OTHER_SETTINGS),
+        ({"id": "other/runs/e"}, None, OTHER_SETTINGS),
+        ({"license": "CC-BY-4.0"}, None, OTHER_LICENCE),
+        ({"license": "CC-BY-4.0", "program_sha256": "0" * 64}, None, OTHER_SETTINGS),
+        ({"program_sha256": "0" * 64}, None, OTHER_PROGRAM),
+        ({}, cut_off, DAMAGED),
+        ({}, replace_by_text, DAMAGED),
+    ],
+)
+def test_a_file_with_another_stamp_is_outdated(file, expected, damage, reason):
+    if damage:
+        damage(file)
+    stamps = {file: STAMP | expected, f"{file}.missing": STAMP}
+    assert list(outdated(stamps)) == ([(file, reason)] if reason else [])
+    if reason:
+        with pytest.raises(ValueError, match=f"run.nc: {reason}"):
+            refuse_outdated(stamps)
+    else:
+        refuse_outdated(stamps)
+
+
+def test_a_file_without_stamp_is_outdated(tmp_path):
+    (_, run), *_ = small.runs()
+    write_dataset(run, tmp_path / "run.nc")
+    assert not any(read_stamp(tmp_path / "run.nc").values())
+    assert dict(outdated({str(tmp_path / "run.nc"): STAMP})) == {str(tmp_path / "run.nc"): OTHER_SETTINGS}
+
+
+def test_a_file_states_another_licence_with_the_same_values(file):
+    before = read_run(file).load()
+    state_licence(file, "CC-BY-4.0")
+    refuse_outdated({file: STAMP | {"license": "CC-BY-4.0"}})
+    after = read_run(file).load()
+    assert after.attrs == before.attrs | {"license": "CC-BY-4.0"} and after.equals(before)
+
+
+def test_units_are_those_of_the_variables_in_files():
+    files = {}
+    for module in (run, campaign, model_error, sensitivity):
+        for table in (each for each in vars(module).values() if isinstance(each, dict)):
+            files |= {name: each.units for name, each in table.items() if hasattr(each, "units")}
+    shared = _QUANTITIES.keys() & files.keys()
+    assert {"contact_stiffness", "hysteresis_loss", "pull_off_force", "surface_energy", "jaccard"} <= shared
+    assert {name: _QUANTITIES[name].unit for name in shared} == {name: files[name] for name in shared}

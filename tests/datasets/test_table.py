@@ -7,9 +7,6 @@ import pandas as pd
 import pytest
 import small_campaign as small
 
-from icha.configuration.cases import run_cases
-from icha.configuration.design import unit_of, varied_values
-from icha.configuration.load import load_configuration
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import read_campaign, write_dataset
 from icha.datasets.labels import RunLabels
@@ -50,36 +47,3 @@ def test_each_target_of_each_run_is_a_row_with_the_values_of_the_run(campaign):
     ):
         np.testing.assert_allclose(rows[column], run[name], rtol=1e-9)
     assert set(rows.contact_modulus_Pa) == {float(run.contact_modulus)}
-
-
-def test_the_values_of_a_configuration_have_their_units(tmp_path):
-    (tmp_path / "c.yaml").write_text("""
-name: c
-title: T
-summary: S
-license: CC0-1.0
-surfaces:
-  rough: {kind: self_affine, period: 100 um, rolloff_wavelength: 50 um, short_wavelength: 20 um, hurst: 0.8, grid: 32}
-materials:
-  soft: {contact_modulus: 25 MPa, surface_energy: 50 mJ/m^2}
-studies:
-  one:
-    surfaces: [rough]
-    rms_slopes: [1.0]
-    materials: [soft]
-    models: [boundary_elements]
-    vary: {short_wavelength: [20 um, 25 um], surface_energy: [1 mJ/m^2, 2 mJ/m^2]}
-    targets: {reduced_pressures: [1.0e-3]}
-""")
-    campaign = load_configuration(tmp_path / "c.yaml").campaign
-    assert len(run_cases(campaign)) == 4
-    assert unit_of(campaign.materials["soft-surface_energy1mJ"], "thickness") == "m"
-    assert unit_of(campaign.surfaces["rough-short_wavelength20um"], "hurst") == "1"
-    assert varied_values(campaign)["one"] == {
-        "short_wavelength": (
-            "surface",
-            "m",
-            {"rough-short_wavelength20um": 20e-6, "rough-short_wavelength25um": 25e-6},
-        ),
-        "surface_energy": ("material", "J m^-2", {"soft-surface_energy1mJ": 1e-3, "soft-surface_energy2mJ": 2e-3}),
-    }

@@ -180,18 +180,3 @@ def test_a_file_with_links_to_other_files_is_not_opened(folders, tmp_path):
         file["elsewhere"] = h5py.ExternalLink(str(tmp_path / "other.nc"), "/step")
     (found,) = compare_folders(*folders).differences
     assert found.verdict == DIFFERENT and "is a link to another file" in found.detail
-
-
-def test_the_same_difference_in_many_files_is_one_line(tmp_path):
-    for k in range(1, 4):
-        path = f"runs/load/rough/seed{k}/slope1/soft.nc"
-        write(tmp_path / "deposit" / path)
-        write(tmp_path / "rerun" / path, changed("pressure", 3, 1e3 * (1 + k * 1e-8)))
-    text = format_comparison(compare_folders(tmp_path / "deposit", tmp_path / "rerun"))
-    assert (
-        text.count("pressure") == 1
-        and "3e-08, at [3]: 1000.0 and 1000.00003 (3 files, the largest in runs/load/rough/seed3" in text
-    )
-    write(tmp_path / "rerun" / path, changed("pressure", 3, 2e3))
-    lines = format_comparison(compare_folders(tmp_path / "deposit", tmp_path / "rerun")).splitlines()
-    assert "different" in lines[0] and "within tolerance" in lines[1]

@@ -75,17 +75,6 @@ def test_the_revision_is_the_commit_or_a_checksum_of_the_files(clone, monkeypatc
     assert checksum() == changed
 
 
-def test_a_program_that_another_repository_ignores_does_not_have_its_commit(clone, monkeypatch):
-    monkeypatch.delenv("GIT_DIR")
-    shutil.rmtree(clone / ".git")
-    outer = clone.parent
-    (outer / ".gitignore").write_text("clone\n")
-    git(outer, "init", "--quiet")
-    git(outer, "add", ".gitignore")
-    git(outer, "-c", "user.name=nobody", "-c", "user.email=nobody@example.org", "commit", "--quiet", "-m", "All")
-    assert program_source(clone).revision.startswith("icha-")
-
-
 def write_lock(folder, **versions):
     packages = (
         f'[[package]]\nname = "{name}"\nversion = "{version}"\nsource = {{ registry = "https://pypi.org/simple" }}\n'

@@ -127,18 +127,6 @@ def test_the_page_lists_failures_that_a_rerun_repeats(small_readme):
     assert "The computation needs 2.34 MB of\ndisk, 200 MB of memory" in page
 
 
-def test_the_page_counts_runs_that_end_at_the_limit_of_their_model():
-    runs = dict(small.runs())
-    first = next(iter(runs))
-    runs[first] = runs[first].assign_attrs(beyond_model="the path ends before its last target")
-    tree = small.campaign_tree(runs.items(), attrs={"campaign": "small"})
-    page = page_of(tree, check_campaign(tree), load_configuration(REPOSITORY / "config/campaigns/smoke.yaml").campaign)
-    assert (
-        "For 1 of the runs, the path leads beyond the range of the model" in page
-        and "all runs are complete" not in page
-    )
-
-
 def test_the_example_selects_a_run_of_surfaces_with_slopes_of_their_own(tmp_path, monkeypatch):
     runs = [(labels, run) for labels, run in crops.runs().items() if labels.model == "asperities"]
     tree = small.campaign_tree(runs, attrs={"campaign": "crops"})

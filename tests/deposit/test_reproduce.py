@@ -151,15 +151,6 @@ def test_single_runs(deposit, reproduce, computed, tmp_path):
     assert status == 2 and "has no such run; expected smallest, or one of its 2 runs" in output and HARD in output
 
 
-def test_the_smallest_run_is_the_smallest_that_is_complete(deposit, reproduce, computed, tmp_path):
-    write_run(tmp_path / "failed.nc", 2, incomplete="the path ends: stuck")
-    failed = (tmp_path / "failed.nc").read_bytes()
-    assert reproduce(deposit(**{f"runs/{SOFT}.nc": failed}), "--only", "smallest")[0] == 0
-    assert computed[-1][1] == [f"results/tiny/runs/{HARD}.nc"]
-    status, output = reproduce(deposit(**dict.fromkeys(RUNS, failed)), "--only=smallest")
-    assert status == 2 and "no run of the deposit is complete" in output
-
-
 def test_a_folder_continues_its_own_rerun_only(deposit, reproduce, computed, tmp_path):
     packed = deposit()
     computed.fails = True
@@ -211,15 +202,6 @@ def test_damaged_deposits_and_those_without_results_are_refused(deposit, reprodu
     status, output = reproduce(packed)
     assert status == 2 and "damaged" in output and "verdict.txt" in output
     assert reproduce(tmp_path / "none")[0] == 2 and not computed
-
-
-def test_what_is_called_a_run_and_is_none_is_refused(deposit, reproduce, computed):
-    status, output = reproduce(deposit(**dict.fromkeys(RUNS, b"no netCDF")), "--only=smallest")
-    assert (
-        status == 2
-        and re.search("soft.nc: is not the file of a run|hard.nc: is not the file of a run", output)
-        and not computed
-    ), output
 
 
 @pytest.mark.slow

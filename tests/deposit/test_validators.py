@@ -2,7 +2,6 @@
 
 import re
 import socket
-import zipfile
 
 import h5py
 import netCDF4
@@ -35,20 +34,6 @@ def failed(done):
     return re.findall(r"^([\w-]+): failed", done.stdout, re.MULTILINE)
 
 
-@pytest.mark.parametrize("kind", ["folder", "zip"])
-def test_a_good_file_passes_in_a_folder_and_in_an_archive(kind, tmp_path):
-    folder = deposit(tmp_path / "mine-1.0")
-    if kind == "zip":
-        with zipfile.ZipFile(tmp_path / "mine-1.0.zip", "w") as archive:
-            for file in folder.iterdir():
-                archive.write(file, f"mine-1.0/{file.name}")
-        folder = tmp_path / "mine-1.0.zip"
-    done = validated(folder, *NAMES)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert not failed(done)
-    assert re.search(r"compliance-checker: passed; (\d+) of \1 points, 2 groups of 1 files", done.stdout), done.stdout
-
-
 def test_files_ask_for_nothing_beyond_themselves(tmp_path, monkeypatch):
     """No network, whatever an attribute names, and no data in other files."""
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "kept"))
@@ -73,12 +58,3 @@ def test_a_unit_that_is_none_is_seen(tmp_path):
     done = validated(deposit(tmp_path / "mine", unit="pascalish"), *NAMES)
     assert done.returncode == 1
     assert failed(done) == ["compliance-checker"] and "data.nc/study" in done.stdout, done.stdout
-
-
-def test_what_is_no_deposit_is_refused(tmp_path):
-    (tmp_path / "SHA256SUMS").touch()
-    done = validated(tmp_path)
-    assert done.returncode == 1 and "is not a deposit" in done.stderr
-    (tmp_path / "ro-crate-metadata.json").write_text("{}")
-    done = validated(sealed(tmp_path), "roc-validator")
-    assert done.returncode == 1 and "roc-validator: failed" in done.stdout

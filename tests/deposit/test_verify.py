@@ -4,7 +4,6 @@ import os
 import random
 import stat
 import zipfile
-from types import SimpleNamespace
 
 import pytest
 from outside_validators import problems_with
@@ -55,14 +54,11 @@ def test_a_whole_deposit_is_whole(ending, folder):
         (lambda f: (f / "README.md").unlink(), {"README.md": "is missing"}),
         (lambda f: (f / "README.md").rename(f / "readme.md"), {"README.md": "is missing", "readme.md": "was added"}),
         (lambda f: (f / "link").symlink_to("/etc"), {"link": "is a link"}),
-        (lambda f: (f / "link").symlink_to("/dev/zero"), {"link": "is a link"}),
         (lambda f: os.mkfifo(f / "pipe"), {"pipe": "is a link, a device"}),
         (lambda f: (f / "a\\b").touch(), {"a\\b": "has a backslash"}),
         (lambda f: (f / "b\ntiny: whole: 9 files").touch(), {"b\\ntiny: whole": "invisible"}),
-        (lambda f: (f / "a\x1b[2J").touch(), {"a\\x1b[2J": "invisible"}),
         (lambda f: (f / "exe\u202etxt.nc").touch(), {"exe\\u202etxt.nc": "invisible"}),
         (lambda f: (f / "SHA256SUMS").unlink(), {"SHA256SUMS": "is missing"}),
-        (lambda f: (f / "SHA256SUMS").write_bytes(b"\xff"), {"SHA256SUMS": "cannot be read"}),
     ],
 )
 def test_every_change_of_a_folder_is_found(spoil, problems, folder):
@@ -128,12 +124,6 @@ def test_what_unpacks_to_far_more_is_not_unpacked(pack, monkeypatch):
     (problem,) = problems_with(folder.with_name("tiny.zip"))
     assert "to 10 MB; expected at most 50 times its size" in problem
     assert problems_with(folder) == []
-
-
-def test_unpacking_needs_room(folder, monkeypatch):
-    monkeypatch.setattr("shutil.disk_usage", lambda path: SimpleNamespace(free=3))
-    with pytest.raises(OSError, match="3 B are free"):
-        problems_with(folder.with_name("tiny.zip"))
 
 
 def test_a_large_text_is_not_read_as_a_whole(folder, monkeypatch):

@@ -211,6 +211,7 @@ def with_results(folder):
 
 
 # The example on hysteresis takes a quarter of an hour.
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "page",
     [page for page in PAGES if blocks(page, "python") and page.stem != "hysteresis"],

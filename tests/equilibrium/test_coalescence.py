@@ -61,16 +61,6 @@ def test_overlapping_pairs_are_all_found_deepest_first(seed):
     assert pairs == brute_force_pairs(position, a)
 
 
-def test_touching_spots_do_not_overlap():
-    position = np.array([[0.25, 0.5], [0.5, 0.5]])
-    near = all_pairs(position, PERIOD)
-    assert len(overlapping_pairs(position, np.array([0.125, 0.125]), *near)) == 0
-    assert len(overlapping_pairs(position, np.array([0.125, 0.12500001]), *near)) == 1
-    # A small spot wholly inside a large one.
-    inside = np.array([[0.5, 0.5], [0.51, 0.5]])
-    assert len(overlapping_pairs(inside, np.array([0.1, 0.001]), *all_pairs(inside, PERIOD))) == 1
-
-
 def test_equal_depths_are_ordered_by_position_not_by_input():
     # A ring of equal spots across the border: every depth is the same.
     position = np.array([[0.05, 0.05], [0.95, 0.05], [0.95, 0.95], [0.05, 0.95], [0.5, 0.5]])
@@ -82,12 +72,6 @@ def test_equal_depths_are_ordered_by_position_not_by_input():
         reference = reference or chosen
         assert chosen == reference
     assert len(reference) == 2
-
-
-def test_every_spot_merges_at_most_once_at_a_time():
-    pairs = disjoint_pairs(np.array([[3, 1], [1, 2], [0, 2], [4, 3]]))
-    np.testing.assert_array_equal(pairs, [[3, 1], [0, 2]])
-    assert disjoint_pairs(np.empty((0, 2), dtype=int)).shape == (0, 2)
 
 
 def two_bumps(energy, order=(0, 1)):

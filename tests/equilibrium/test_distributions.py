@@ -122,17 +122,6 @@ def test_gaps_on_the_edges_of_bins_are_counted_in_the_bin_above():
     np.testing.assert_array_equal(index, expected)
 
 
-def test_distributions_have_the_same_bits_on_any_number_of_cores(rough, monkeypatch):
-    surface, law, state = rough
-    bits = []
-    for threads in ("1", "3"):
-        monkeypatch.setenv("OMP_NUM_THREADS", threads)
-        gaps = gap_distribution(law, surface, state)
-        cover = contact_cover(surface, state.spots)
-        bits.append(gaps["gap_density"].tobytes() + np.array(gaps["overlap_fraction"]).tobytes() + cover.tobytes())
-    assert bits[0] == bits[1]
-
-
 def test_gap_distribution_around_one_hertz_spot():
     # One paraboloid on a fine grid: the area with gaps up to u is a ring whose radius follows from closed forms.
     n, R = 256, 100e-6
@@ -157,19 +146,6 @@ def test_gap_distribution_around_one_hertz_spot():
         radius = scipy.optimize.brentq(lambda r, target=edges[edge]: u(r) - target, a, 6 * a)
         ring = np.pi * (radius**2 - a**2) / PERIOD**2
         assert cumulative[edge] == pytest.approx(ring, rel=0.01)
-
-
-def test_before_contact_the_gap_is_that_of_the_heights():
-    surface, contact, state = pressed(0.0, levels=())
-    gaps = gap_distribution(contact.law, surface, state)
-    counted, _ = np.histogram(state.separation - surface.heights, bins=gap_bins(surface))
-    # The highest node may lie on the refined summit itself.
-    np.testing.assert_allclose(
-        gaps["gap_density"] * np.diff(gap_bins(surface)), counted / surface.grid**2, atol=1.5 / surface.grid**2
-    )
-    pressures = pressure_distribution(contact.law, surface, state.spots)
-    np.testing.assert_array_equal(pressures["pressure_density"], 0)
-    np.testing.assert_array_equal(pressures["pressure_bin_mean"], 0)
 
 
 def test_identities_of_the_pressure_distribution(case):

@@ -11,7 +11,7 @@ from icha import Material, SelfAffineSpectrum, Surface
 from icha.asperity.jkr import JKR
 from icha.contact.model import COALESCENCE, JUMP_OFF, Control, Events, NotConverged
 from icha.contact.models import RESIDUAL_TOLERANCE
-from icha.equilibrium import newton, solver
+from icha.equilibrium import solver
 from icha.equilibrium.interacting_asperities import InteractingAsperities, contact_of
 from icha.half_space.ewald import PointHalfSpace
 from icha.half_space.interaction import Interaction, displacement_at
@@ -150,20 +150,6 @@ def test_a_shielded_asperity_does_not_touch():
     a = state.spots.contact_radius[0]
     w = periodic_displacement(0.08 * PERIOD, 0.0, a, R, MODULUS, 0.0, PERIOD)
     assert low - u - w < 0
-
-
-def test_without_adhesion_a_lost_contact_frees_the_asperities_under_it():
-    # One step down: the large spot covers the lower asperity. Out of contact and down again: both touch on their own.
-    position = np.array([[0.5, 0.5], [0.53, 0.5]]) * PERIOD
-    asperities = Asperities(position, np.array([1e-6, 0.98e-6]), np.array([1.0, 0.1]) * R, PERIOD)
-    contact = InteractingAsperities(JKR(Material(MODULUS, 0.0, RANGE)), asperities, rms_height=1e-6)
-    covered = contact.equilibrium(contact.untouched(), 0.5e-6)
-    np.testing.assert_array_equal(spot_of_asperity(covered), [0, 0])
-    lost = contact.equilibrium(covered, 1.1e-6)
-    np.testing.assert_array_equal(lost.site_of_asperity, [-1, -1])
-    again, first = (contact.equilibrium(state, 0.97e-6) for state in (lost, contact.untouched()))
-    assert len(again.spots) == len(first.spots) == 2
-    assert contact.pressure(again) == pytest.approx(contact.pressure(first), rel=1e-6)
 
 
 def rough(energy, grid=64, seed=1, ratio=16):
@@ -334,25 +320,8 @@ def test_states_along_a_path_are_consistent(energy):
     assert events.count(COALESCENCE) > 0 and events.count(JUMP_OFF) > 0
 
 
-def test_the_last_solve_for_the_response_counts(monkeypatch):
-    contact = group(2, ENERGY)
-    state = contact.equilibrium(contact.untouched(), 0.85e-6)
-    monkeypatch.setattr(newton, "_APPROXIMATE_SOLVES", 0)
-    monkeypatch.setattr(newton, "_EXACT_SOLVES", 1)
-    by_one_solve = contact.equilibrium(contact.untouched(), 0.85e-6)
-    np.testing.assert_allclose(by_one_solve.sites.response, state.sites.response, rtol=1e-3)
-
-
 def test_too_few_newton_steps_are_reported_not_passed_off(monkeypatch):
     contact = rough(ENERGY)
     monkeypatch.setattr(solver, "_MAX_NEWTON_STEPS", 1)
     with pytest.raises(NotConverged, match="equilibrium error"):
         contact.equilibrium(contact.untouched(), 1.5 * contact.rms_height)
-
-
-def test_events_that_lead_back_to_the_same_spots_end_soon(monkeypatch):
-    """If unions are made and undone in a circle, ten rounds show that there is no equilibrium."""
-    monkeypatch.setattr(solver, "apply_events", lambda state, point, margin: (state, True))
-    contact, top = bump(ENERGY)
-    with pytest.raises(NotConverged, match="no equilibrium after 11 rounds of jumps and unions"):
-        contact.equilibrium(contact.untouched(), top)

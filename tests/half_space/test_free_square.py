@@ -15,7 +15,7 @@ from icha.contact.model import Control, gap_bins
 from icha.equilibrium.distributions import gap_distribution
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.half_space.ewald import PointHalfSpace
-from icha.half_space.free_square import image_potential, mean_displacement
+from icha.half_space.free_square import mean_displacement
 from icha.half_space.interaction import Interaction, displacement_at
 from icha.surfaces.summits import Asperities, find_summits
 
@@ -98,10 +98,6 @@ def test_field_is_the_plain_sum_at_the_nodes(energy, grid):
     np.testing.assert_allclose(field[tuple(nodes.T)], exact, atol=1e-7 * np.max(np.abs(exact)), rtol=0)
 
 
-def test_images_sum_to_the_madelung_constant():
-    assert image_potential(np.zeros(1), np.zeros(1))[0] == pytest.approx(MADELUNG, abs=1e-13)
-
-
 def contact_of(position, height, R, energy, period=1.0, free=True):
     position, height, R = np.array(position, float), np.array(height, float), np.array(R, float)
     return InteractingAsperities(law(energy), Asperities(position, height, R, period, free), rms_height=1e-3)
@@ -147,18 +143,6 @@ def test_unlike_spots_in_equilibrium(energy):
     found = scipy.optimize.root(error, np.sqrt(R * (height - u)) * 0.9, tol=1e-13)
     assert found.success
     np.testing.assert_allclose(state.spots.contact_radius[spot_of_asperity(state)], found.x, rtol=1e-7)
-
-
-@pytest.mark.parametrize("energy", WEAK)
-def test_a_group_of_spots_may_be_anywhere_and_the_square_of_any_size(energy):
-    """Only ways between spots count: not where the edges are."""
-    rng = np.random.default_rng(7)
-    position, height, R = 0.3 * rng.random((12, 2)), -1e-3 * rng.random(12), rng.uniform(0.5, 1.5, 12)
-    loads = []
-    for shift, period in (([0.0, 0.0], 1.0), ([0.7, 0.65], 1.0), ([0.1, 0.0], 0.45), ([1.7, 2.0], 5.0)):
-        contact = contact_of(position + shift, height, R, energy, period)
-        loads.append(contact.pressure(pressed(contact, -2e-3)) * period**2)
-    np.testing.assert_allclose(loads, loads[0], rtol=1e-7)
 
 
 def test_united_spots_lie_between_their_parts_and_not_across_the_edges():
@@ -211,24 +195,6 @@ def test_mean_displacement_is_exact_for_forces():
     assert (found[0.5, 0.5], found[0.0, 0.0]) == pytest.approx((middle, middle / 2), rel=1e-12)
 
 
-def test_a_wide_rough_square_is_nearly_periodic():
-    """The same heights: what differs are some spots at the rim, and the mean plane far away."""
-    heights = icha.SelfAffineSpectrum(1e-4, 1.5e-5, 4e-6, 0.8, rms_slope=0.2).realise(160, 3).heights
-    material = icha.Material(25e6, 0.0, 1e-8)
-    path = icha.Path(reduced_pressures=[2e-3, 1e-2, 3e-2])
-    periodic, free = (
-        icha.simulate(icha.Surface(heights, 1e-4, boundary), material, path) for boundary in ("periodic", "free")
-    )
-    area = free["contact_area_fraction"].values / periodic["contact_area_fraction"].values
-    np.testing.assert_allclose(area, 1.0, atol=0.06)
-    np.testing.assert_array_equal(periodic["mean_gap"], periodic["mean_separation"])
-    height = float(periodic["rms_height"])
-    np.testing.assert_allclose(free["mean_gap"] / height, periodic["mean_gap"] / height, atol=0.1)
-    # Sunk in by about the mean displacement under an even pressure.
-    sunk = (free["mean_gap"] - free["mean_separation"]).values
-    np.testing.assert_allclose(sunk / (0.9464 * 1e-4 * free["nominal_pressure"].values / 25e6), 1.0, atol=0.05)
-
-
 def whole_and_part(n=160, low=24, high=104):
     """A periodic surface, and a part of it as a single square."""
     whole = icha.SelfAffineSpectrum(1.0, 0.4, 0.06, 0.8).realise(n, 5)
@@ -256,23 +222,6 @@ def test_summits_of_a_part_are_those_of_the_whole():
     # And next to them neither many more nor many fewer.
     assert abs(len(found) - np.count_nonzero(inside)) <= 0.05 * len(found) + 1
     assert np.all((found.position > 0) & (found.position < inner))
-
-
-def test_edges_have_no_summits():
-    """Crests that run over an edge have their tops outside, whatever the slope there."""
-    n = 40
-    y, x = np.mgrid[:n, :n] / n
-    for heights in (
-        -((y - 0.5) ** 2) + 0.5 * x,  # a crest that rises towards x = 1
-        -((y - 0.3) ** 2) - (x - 1.2) ** 2,  # its top lies beyond
-        -((y + 0.1) ** 2) - (x + 0.1) ** 2,  # beyond a corner
-        -((y - 0.5) ** 2) - (x - 0.99) ** 2,  # between the last node and the end of the period
-    ):
-        with pytest.raises(ValueError, match="no summit"):
-            find_summits(icha.Surface(heights, 1.0, boundary="free"))
-    found = find_summits(icha.Surface(-2 * (y - 0.312) ** 2 - 3 * (x - 0.613) ** 2, 1.0, boundary="free"))
-    np.testing.assert_allclose(found.position, [[0.613, 0.312]], atol=1e-6)
-    np.testing.assert_allclose(found.radius_of_curvature, 1 / np.sqrt(4 * 6), rtol=1e-4)
 
 
 def test_moments_of_a_free_square_are_means_over_it():

@@ -6,7 +6,7 @@ import scipy.special
 from fields import displacement_field
 from half_space import CENTRES, CURVATURE, ENERGIES, MODULUS, RADIUS, law, periodic_displacement, spectral_displacement
 
-from icha.half_space.grid_displacement import DisplacementField, smooth_half, windows
+from icha.half_space.grid_displacement import smooth_half, windows
 
 
 @pytest.mark.parametrize("k", range(4))
@@ -72,14 +72,6 @@ def test_large_and_small_spots_together_are_the_sum_of_each_alone(energy):
     together = displacement_field(law(energy), 1.0, n, centres, a, R)
     alone = sum(displacement_field(law(energy), 1.0, n, centres[[j]], a[[j]], R[[j]]) for j in range(len(a)))
     np.testing.assert_allclose(together, alone, rtol=0, atol=3e-8 * np.max(np.abs(alone)))
-
-
-def test_rows_by_themselves_are_those_of_the_whole_field():
-    centres, a, R = many_spots()
-    whole = displacement_field(law(0.0), 1.0, 200, centres, a, R)
-    field = DisplacementField(law(0.0), 1.0, 200, centres, a, R)
-    for rows in (slice(0, 1), slice(77, 130), slice(199, 200)):
-        np.testing.assert_allclose(field.rows(rows), whole[rows], rtol=0, atol=1e-14 * np.max(np.abs(whole)))
 
 
 def test_spots_of_no_radius_and_no_spots_displace_nothing():

@@ -11,7 +11,6 @@ from half_space import (
     law,
     periodic_displacement,
     periodic_point_load,
-    spectral_displacement,
 )
 
 from icha.half_space.ewald import PointHalfSpace
@@ -24,13 +23,6 @@ def between(law, centres, largest, R, period=1.0):
 
 def at_spots(energy, centres=CENTRES, a=RADIUS, R=CURVATURE):
     return between(law(energy), centres, a, R).displacement(a)
-
-
-def test_the_direct_image_sum_has_the_known_constants():
-    # 1/r - 3.900265/L + 2.2584 r^2/L^3 (and a fourth-order term).
-    assert periodic_point_load(0, 0) == pytest.approx(-3.900265, abs=5e-7)
-    for r in (0.02, 0.04):
-        assert periodic_point_load(r, 0) - 1 / r == pytest.approx(-3.900265 + 2.2584 * r**2, abs=3 * r**4 + 1e-6)
 
 
 def test_a_lone_small_spot_feels_the_constant_of_its_own_images():
@@ -88,28 +80,6 @@ def test_point_loads_against_the_direct_image_sum_for_many_spots(energy):
         assert w[i] == pytest.approx(total / (np.pi * MODULUS), abs=1e-6 * np.max(np.abs(w)))
 
 
-def test_one_large_spot():
-    # The window is half the cell and not many radii: force and second moment must carry the images.
-    centre, a, R = np.array([[0.4, 0.7]]), np.array([0.1]), np.array([1.0])
-    w = between(law(0.0), centre, a, R).displacement(a)
-    series = spectral_displacement(centre, a, R, MODULUS, 0.0, 1.0, 1000)
-    own = law(0.0).displacement(0.0, a, R)
-    assert w[0] == pytest.approx(series[700, 400] - own[0], abs=2e-5 * own[0])
-
-
-@pytest.mark.parametrize("energy", ENERGIES)
-def test_tangent_against_differences(energy):
-    operator = between(law(energy), CENTRES, 1.2 * RADIUS, CURVATURE)
-    tangent, _ = operator.tangent(RADIUS)
-    for j in range(3):
-        direction = np.eye(3)[j]
-        step = 1e-4 * RADIUS[j]
-        difference = (
-            operator.displacement(RADIUS + step * direction) - operator.displacement(RADIUS - step * direction)
-        ) / (2 * step)
-        np.testing.assert_allclose(tangent(direction), difference, rtol=1e-6, atol=1e-8 * np.abs(difference).max())
-
-
 def test_tangent_against_differences_for_many_spots():
     rng = np.random.default_rng(5)
     count = 400
@@ -126,50 +96,6 @@ def test_tangent_against_differences_for_many_spots():
     assert np.mean(good) > 0.97
     # The operator of the linear solves only has to be close.
     assert np.max(np.abs(approximate(direction) - value)) < 5e-3 * np.max(np.abs(value))
-
-
-def test_reciprocity_of_small_spots():
-    # Betti: F_i w_i(j) = F_j w_j(i), for spots small against their distance.
-    centres = np.array([[0.1, 0.2], [0.35, 0.9]])
-    a, R = np.array([1e-3, 2e-3]), np.array([1.0, 1.0])
-    force = law(0.0).force(a, R)
-    both = at_spots(0.0, centres, a, R)
-    own = [at_spots(0.0, centres[[j]], a[[j]], R[[j]])[0] for j in range(2)]
-    assert force[0] * (both[0] - own[0]) == pytest.approx(force[1] * (both[1] - own[1]), rel=1e-4)
-
-
-@pytest.mark.parametrize("energy", ENERGIES)
-def test_shifts_and_quarter_turns(energy):
-    reference = at_spots(energy)
-    shift = np.array([0.731, 2.118])
-    np.testing.assert_allclose(at_spots(energy, np.mod(CENTRES + shift, 1.0)), reference, rtol=1e-9)
-    turned = np.stack([1 - CENTRES[:, 1], CENTRES[:, 0]], axis=1)
-    np.testing.assert_allclose(at_spots(energy, turned), reference, rtol=1e-9)
-    order = [2, 0, 1]
-    np.testing.assert_allclose(
-        at_spots(energy, CENTRES[order], RADIUS[order], CURVATURE[order]), reference[order], rtol=1e-10
-    )
-
-
-def test_a_spot_of_no_radius_adds_nothing():
-    a = np.array([0.02, 0.0, 0.015])
-    points = np.array([[0.6, 0.55], [0.6005, 0.55], [0.1, 0.1]])
-    three = displacement_at(law(0.0), 1.0, points, CENTRES, a, CURVATURE)
-    two = displacement_at(law(0.0), 1.0, points, CENTRES[[0, 2]], a[[0, 2]], CURVATURE[[0, 2]])
-    np.testing.assert_allclose(three, two, rtol=1e-9)
-
-
-def test_nothing_in_contact_displaces_nothing():
-    empty = np.empty(0)
-    nowhere = np.empty((0, 2))
-    np.testing.assert_array_equal(displacement_at(law(0.0), 1.0, CENTRES, nowhere, empty, empty), np.zeros(3))
-    assert len(between(law(0.0), nowhere, empty, empty).displacement(empty)) == 0
-
-
-@pytest.mark.parametrize("energy", ENERGIES)
-def test_spots_may_outgrow_their_windows_a_little(energy):
-    narrow = between(law(energy), CENTRES, RADIUS / 1.5, CURVATURE).displacement(RADIUS)
-    np.testing.assert_allclose(narrow, at_spots(energy), rtol=1e-6)
 
 
 @pytest.mark.parametrize("energy", ENERGIES)

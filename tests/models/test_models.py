@@ -27,7 +27,6 @@ from icha.planning.costs import LAWS, RUN_SIZES
 from icha.report.report import write_report
 
 PATH = icha.Path(reduced_pressures=[1e-3, 1e-2], snapshots=[("reduced_pressure", 1e-3), ("reduced_pressure", 1e-2)])
-BACK = icha.Path(reduced_pressures=[1e-3], unload=True)
 
 
 def run(model, path=PATH, material="soft", seed=1):
@@ -47,12 +46,6 @@ def runs():
     """Both models of one material, and asperities alone of the other; tests must not change them."""
     found = {labels(model): run(model) for model in MODELS}
     return found | {labels(DEFAULT_MODEL, "hertz"): run(DEFAULT_MODEL, material="hertz")}
-
-
-@pytest.mark.parametrize("model", ["asperity", None, ["asperities"]])
-def test_other_models_are_refused_by_name(model):
-    with pytest.raises(ValueError, match=r"^model: .* must be one of asperities, boundary_elements"):
-        icha.simulate(small.surface(), small.MATERIALS["soft"], PATH, model=model)
 
 
 def test_a_run_says_by_which_model_it_is(runs, tmp_path):
@@ -138,21 +131,6 @@ def test_every_run_of_both_models_is_taken_out_unchanged(runs):
         select_run(tree, labels("other"))
 
 
-def test_a_failed_run_of_boundary_elements_leaves_the_others_whole(runs):
-    broken = labels(REFERENCE_MODEL)
-    whole = runs[broken]
-    nothing = {"step": slice(0, 0), "snapshot": slice(0, 0), "spot": slice(0, 0)}
-    for part in (nothing, {"step": slice(0, 1), "snapshot": slice(0, 0), "spot": slice(0, 0)}):
-        short = whole.isel(part).assign_attrs(incomplete="it ends")
-        tree = campaign_tree((runs | {broken: short}).items())
-        assert select_run(tree, broken).attrs["incomplete"] == "it ends"
-        failed = [check for check in check_campaign(tree) if not check.passed]
-        assert [(check.subject, check.name) for check in failed] == [(str(broken), "completed")]
-        np.testing.assert_array_equal(
-            select_run(tree, labels(DEFAULT_MODEL))["spot_x"], runs[labels(DEFAULT_MODEL)]["spot_x"]
-        )
-
-
 def test_asperities_end_at_the_limit_of_their_range_beside_boundary_elements(tmp_path):
     path = icha.Path([0.05, 0.1, 0.3], unload=True, snapshots=[("reduced_pressure", 0.3)])
     whole = icha.simulate(small.surface(1), small.MATERIALS["hertz"], path, model=REFERENCE_MODEL, seed=1)
@@ -189,22 +167,6 @@ def test_fronts_are_checked(runs):
     for name, value in (("front_residual", 0.5), ("gap_residual", 0.1)):
         worse = patched.assign({name: patched[name] * 0 + value})
         assert len([check for check in check_run(worse) if not check.passed]) == 1
-
-
-def test_figures_show_asperities_or_else_what_there_is(runs):
-    tree = campaign_tree(runs.items())
-    assert {each.model for each, _ in select_runs(tree, "one")} == {DEFAULT_MODEL}
-    alone = campaign_tree([(labels(REFERENCE_MODEL), runs[labels(REFERENCE_MODEL)])])
-    assert [each for each, _ in select_runs(alone, "one")] == [labels(REFERENCE_MODEL)]
-
-
-def test_models_are_compared_side_by_side(runs):
-    comparison = compare_runs(campaign_tree(runs.items())["one"].to_dataset())
-    areas = comparison["contact_area_fraction"].sel(material="soft")
-    for model in MODELS:
-        expected, error = runs[labels(model)]["contact_area_fraction"], MODELS[model].accuracy.target
-        np.testing.assert_allclose(areas.sel(model=model).values.ravel()[[0, -1]], expected, rtol=error)
-    assert comparison["seed_count"].dims == ("model", "surface", "rms_slope", "material")
 
 
 def test_all_that_is_known_by_model_is_there_of_every_model():

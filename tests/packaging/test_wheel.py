@@ -41,23 +41,6 @@ study = xr.open_datatree("campaign.nc")["slopes"].to_dataset()
 print(float(study.contact_area_fraction.sum()))
 """
 
-# A program whose types mypy reports.
-TYPED = """
-import icha
-
-spectrum = icha.SelfAffineSpectrum(
-    period=100e-6, rolloff_wavelength=20e-6, short_wavelength=10e-6, hurst=0.8, rms_slope=1.0
-)
-surface: icha.Surface = spectrum.realise(grid=64, seed=1)
-material = icha.Material(contact_modulus=25e6, surface_energy=0.05, interaction_range=2.071e-9)
-try:
-    run = icha.simulate(surface, material, icha.Path(reduced_pressures=[1e-3]), model="asperities")
-except icha.ConvergenceError as error:
-    run = error.dataset
-reveal_type(run)
-reveal_type(surface.heights)
-reveal_type(icha.__version__)
-"""
 CAMPAIGN = f"""{tiny_campaign.CAMPAIGN.replace("[1, 2]", "[1]").replace("[bare, soft]", "[bare]")}
 publication:
   version: "1.0.0"
@@ -137,7 +120,7 @@ def test_the_wheel_has_the_package_and_the_workflow_and_nothing_else(built):
     with zipfile.ZipFile(wheel) as archive:
         content = {name: archive.read(name) for name in archive.namelist()}
     tops = {name.partition("/")[0] for name in content if ".dist-info/" not in name}
-    assert tops == {"icha", "icha_workflow"}
+    assert tops == {"icha", "icha_workflow"} and "icha/py.typed" in content
     # Files in the wheel have the bytes of the repository, and the wheel contains all files of these folders.
     for name, data in content.items():
         if name.startswith("icha_workflow/"):
@@ -172,19 +155,6 @@ def test_a_command_without_the_workflow_names_the_missing_package(library, tmp_p
     for program, *rest in (["icha", "show", "x.nc"], ["python", "-m", "icha"]):
         said = call(library / program, *rest, cwd=tmp_path, status=1)
         assert len(said.splitlines()) == 1 and said.rstrip().endswith("pip install 'icha[workflow]'")
-
-
-def test_type_checkers_see_the_types_of_public_names(library, tmp_path):
-    (tmp_path / "typed.py").write_text(TYPED)
-    mypy = [sys.executable, "-m", "mypy", "--python-executable", library / "python", "--follow-imports=silent"]
-    said = call(*mypy, "--strict", "typed.py", cwd=tmp_path)
-    assert [
-        line.partition('Revealed type is "')[2].rstrip('"') for line in said.splitlines() if "Revealed" in line
-    ] == [
-        "xarray.core.dataset.Dataset",
-        "numpy.ndarray[tuple[Any, ...], numpy.dtype[Any]]",
-        "str",
-    ], said
 
 
 def test_new_and_shipped_campaigns_work_in_any_folder(workflow, tmp_path):

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 import icha
 from icha import Material, Path
-from icha.contact.model import COALESCENCE, JUMP_IN, JUMP_OFF, Events, events_between
+from icha.contact.model import COALESCENCE, JUMP_IN, JUMP_OFF, Events
 from icha.path import step_accuracy
 from icha.path.energy_balance import EnergyBalance, Step
 from icha.path.targets import DEFAULT_STEP
@@ -39,16 +39,6 @@ def test_one_asperity_loses_what_lies_between_jump_in_and_jump_off(step):
     assert jump_off == pytest.approx(stored, rel=1e-4)
     assert coalescence == load_jump == 0
     assert waypoints[-1].balance.work * contact.area == pytest.approx(total, rel=1e-9)
-
-
-@pytest.mark.parametrize("beyond", [0.0, 0.1, 3.0])
-def test_a_jump_into_contact_sets_free_no_less_where_it_is_found_late(beyond):
-    contact = few.contact_of([few.HEIGHT])
-    start = contact.untouched()
-    found = contact.equilibrium(start, few.HEIGHT - few.WU - beyond - 1e-9)
-    events = events_between(start, found)
-    assert events.kind.tolist() == [JUMP_IN]
-    assert events.energy == pytest.approx(-few.energy(few.stable_radius(few.WU)), rel=1e-9)
 
 
 def test_under_load_one_asperity_loses_more():
@@ -122,21 +112,6 @@ def test_separate_asperities_jump_one_by_one():
             assert passed >= abs(moved)
 
 
-def test_separate_asperities_pull_together_where_their_curves_say():
-    contact, waypoints = dilute()
-    _, outward = dilute_edges()
-
-    def pull(u):
-        touching = [(h - u, R) for h, R, d in zip(HEIGHTS, RADII, outward, strict=True) if h - u >= d]
-        return sum(few.force(radius(d, R), R) for d, R in touching)
-
-    u = np.linspace(few.HEIGHT - 3, few.HEIGHT + 2, 1501)
-    weakest = min((w for w in waypoints if w.leg == 1), key=lambda w: few.load(contact, w))
-    lowest = min(map(pull, u))
-    assert few.load(contact, weakest) == pytest.approx(lowest, rel=1e-3)
-    assert few.load(contact, weakest) == pytest.approx(pull(weakest.state.separation), rel=1e-5)
-
-
 @cache
 def bare_surface():
     return icha.SelfAffineSpectrum(100e-6, 20e-6, 12.5e-6, 0.8, rms_slope=0.2).realise(64, 1)
@@ -174,12 +149,6 @@ def test_without_adhesion_a_union_costs_next_to_nothing():
     end = few.closed_again(waypoints)
     assert few.counts(end)[COALESCENCE:] == [1, 1]  # every union is undone
     assert abs(lost(contact, waypoints)[0]) < 1e-3 * max(w.balance.work * contact.area for w in waypoints)
-
-
-def test_a_union_that_is_undone_where_the_two_would_just_touch_costs_next_to_nothing():
-    contact = few.pair(0.0, 6.0)
-    total, *_, by_union, _, _ = lost(contact, few.travelled(contact, [0.03], unload=True))
-    assert total > 0 and abs(by_union) < 0.02 * total
 
 
 @cache
@@ -228,19 +197,6 @@ def test_the_step_does_not_matter(monkeypatch):
     assert fine.sizes["step"] > coarse.sizes["step"]
     for name in ("pull_off_pressure", "hysteresis_loss"):
         assert float(fine[name]) == pytest.approx(float(coarse[name]), rel=0.01), name
-
-
-@pytest.mark.slow
-def test_next_to_no_adhesion_is_no_more_work_than_a_little():
-    """Where jumps set next to nothing free, it need not be known where they happen to more than the work is known."""
-    surface = icha.SelfAffineSpectrum(1e-4, 5e-5, 2.5e-5, 0.8, 1.0).realise(32, 1)
-    steps = {}
-    for adhesion in (1e-14, 1e-5):
-        material = Material(25e6, adhesion, max(1e-3 * adhesion, 1e-18))
-        run = icha.simulate(surface, material, Path([1e-3], unload=True, max_step=0.5))
-        steps[adhesion] = run.sizes["step"]
-        assert float(run.hysteresis_loss) < 1e-4 * np.abs(run.work.values).max()
-    assert steps[1e-14] <= steps[1e-5]
 
 
 @pytest.mark.parametrize("gained_and_lost", [(-1.0, 1.0001), (1.0001, -1.0)])

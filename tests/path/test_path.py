@@ -161,48 +161,27 @@ def test_steps_that_fail_are_halved_and_then_given_up(surface):
     assert 2.0**-14 <= min(widths) / max(widths) < 2.0**-13
 
 
-def test_progress_reports_every_target(surface):
-    lines = []
-    simulate(surface, BARE, Path(reduced_pressures=[1e-3, 1e-2]), progress=lines.append)
-    assert [line.split(":")[0] for line in lines] == ["stop 1 of 2", "stop 2 of 2"]
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({}, "exactly one"),
         ({"reduced_pressures": [0.1], "area_fractions": [0.1]}, "reduced_pressures, area_fractions"),
-        ({"reduced_pressures": []}, "reduced_pressures: the list is empty"),
         ({"reduced_pressures": [1e-2, 1e-3]}, r"reduced_pressures\[1\].*increasing"),
         ({"mean_separations": [1e-6, 2e-6]}, r"mean_separations\[1\].*decreasing"),
         ({"forces": [0.0, 1e31]}, r"forces\[1\]: 1e\+31 must be .* \(in N\)"),
-        ({"indentations": [1e-6, -1e-6]}, r"indentations\[1\].*increasing"),
-        ({"contact_radii": [0.0]}, r"contact_radii\[0\]: 0.0 must be .* \(in m\)"),
         ({"reduced_pressures": [101.0]}, r"reduced_pressures\[0\]: .* at most 100"),
         ({"reduced_pressures": [0.1], "unload": 1}, "unload: expected True or False, got 1"),
-        ({"reduced_pressures": [0.1], "max_step": None}, "max_step"),
         ({"reduced_pressures": [0.1], "snapshots": [("load", 0.1)]}, r"snapshots\[0\].*kind"),
-        ({"reduced_pressures": [0.1], "snapshots": 0.1}, "snapshots: expected a list of pairs"),
-        ({"mean_separations": b"1"}, "mean_separations: expected a list of numbers, got b'1'"),
-        ({"reduced_pressures": [0.1], "snapshots": [0.1]}, r"snapshots\[0\]"),
         ({"reduced_pressures": [0.1], "snapshots": [("area_fraction", 1.1)]}, r"snapshots\[0\]: .* in "),
         ({"reduced_pressures": [0.1], "snapshots": [("area_fraction", 0.1)] * 2}, r"snapshots\[1\].*twice"),
-        ({"reduced_pressures": [1e-2], "max_step": 5e-324}, r"^max_step: 5e-324 must be a number in \[1e-4, 0.5\]"),
         # Unloading.
         ({"reduced_pressures": [0.1], "control": "force", "unload": True}, "^control: 'force' must be one of sep"),
         ({"reduced_pressures": [0.1], "control": "load"}, "^control: 'load'"),
         *(
             ({"reduced_pressures": [0.1], "turning_points": turns}, message)
             for turns, message in (
-                (0.1, "^turning_points: expected a list of pairs"),
-                ([0.1], r"^turning_points\[0\]: expected a pair"),
                 ([("load", 0.01)], r"^turning_points\[0\]: kind 'load' must be one of"),
                 ([("reduced_pressure", 0.1)], r"^turning_points\[0\]: 0.1 .*0\.1"),
-                ([("reduced_pressure", -1e-80)], r"^turning_points\[0\]: -1e-80"),
                 ([("reduced_pressure", 0.05), ("reduced_pressure", 0.04)], r"^turning_points\[1\]: 0.04"),
-                ([("reduced_pressure", -0.01), ("reduced_pressure", -0.02)], r"^turning_points\[1\]"),
-                ([("mean_separation", -1e-6)], r"^turning_points\[0\]: -1e-06"),
-                ([("force", -1e31)], r"^turning_points\[0\]: -1e\+31 .* \(in N\)"),
             )
         ),
         *(
@@ -265,25 +244,3 @@ def test_no_state_outside_the_range_of_the_model_is_returned(surface):
     with pytest.raises(ConvergenceError, match=r"grows to 0\.\d\d of the nominal area, outside the range") as caught:
         simulate(surface, Material(MODULUS, 0.3, 2.071e-9), Path(mean_separations=[surface.rms_height, 1e-12]))
     assert caught.value.dataset.sizes["step"] == 1
-
-
-def test_hardly_any_load_is_met_beside_a_large_attraction(surface):
-    # The attraction is a million times the load that is asked for.
-    run = simulate(surface, ADHESIVE, Path(reduced_pressures=[1e-12, 1e-10]))
-    gross = ADHESIVE.surface_energy / float(surface.rms_height) * 1e-3
-    pressure = run.nominal_pressure.values
-    unit = MODULUS * surface.rms_slope
-    assert np.all(np.abs(pressure - np.array([1e-12, 1e-10]) * unit) < 1e-9 * gross)
-
-
-def test_a_path_that_lasts_reports_where_it_is_between_its_targets(surface, monkeypatch):
-    monkeypatch.setattr("icha.path.loading.REPORT_AFTER", 0.0)
-    lines = []
-    simulate(surface, BARE, Path([1e-2], unload=True, max_step=0.1), progress=lines.append)
-    first, *_ = lines
-    assert first.startswith("loading, 0 of 1 stops, at a mean separation of ") and " Pa, " in first and "A/A0 " in first
-    assert any(line.startswith("unloading, 1 of 1 stops, ") for line in lines)
-    monkeypatch.setattr("icha.path.loading.REPORT_AFTER", 60.0)
-    lines.clear()
-    simulate(surface, BARE, Path([1e-2]), progress=lines.append)
-    assert len(lines) == 1 and lines[0].startswith("stop 1 of 1: reduced_pressure = 0.01, at a mean separation of ")

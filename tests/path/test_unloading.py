@@ -14,13 +14,8 @@ from scipy.optimize import brentq
 
 import icha
 from icha import Material, Path
-from icha.contact.model import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, ContactModel, NotConverged, events_between
-from icha.equilibrium.interacting_asperities import InteractingAsperities
-from icha.path.cycle import _Cycle
-from icha.path.follow import follow
-from icha.path.loading import PathProgress
-from icha.path.step_accuracy import StepAccuracy
-from icha.path.targets import LOAD_CONTROL, MAX_REDUCED_PRESSURE
+from icha.contact.model import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, events_between
+from icha.path.targets import LOAD_CONTROL
 from icha.surfaces.summits import find_summits
 from validation.surfaces import paraboloid
 
@@ -107,16 +102,6 @@ def test_two_equal_asperities_let_go_at_their_common_limit_point():
     np.testing.assert_allclose(np.sort(events.position[events.kind == JUMP_OFF, 0]), few.FAR / 2 + np.array([-4, 4]))
 
 
-def test_four_equal_asperities_break_contact_at_their_common_limit_point():
-    side = 12.0
-    contact = few.contact_of([few.HEIGHT] * 4, [[0, 0], [side, 0], [0, side], [side, side]])
-    waypoints = few.travelled(contact, [0.005], unload=True)
-    above, _ = few.limit_point(lambda a: 2 * few.beside(side, a) + few.beside(np.sqrt(2) * side, a))
-    last = [w.state for w in waypoints if len(w.state.spots)][-1]
-    assert len(last.spots) == 4 and last.separation - few.HEIGHT == pytest.approx(above, abs=2e-5)
-    assert few.counts(few.closed_again(waypoints))[JUMP_OFF] == 4
-
-
 def some():
     """Two asperities that interact with each other and with their images."""
     return few.contact_of([few.HEIGHT, few.HEIGHT - 1.5], [[-9, 0], [8, 3]], period=60.0)
@@ -137,13 +122,10 @@ def value_of(kind, contact, waypoint):
 @pytest.mark.parametrize(
     ("kind", "back", "forth", "control"),
     [
-        pytest.param("reduced_pressure", 0.0, 0.012, "separation", marks=pytest.mark.slow),
         ("reduced_pressure", -0.002, 0.004, "load"),
-        pytest.param("relative_load", -0.003 * 1e3 / 3600, 5.0 / 3600, "separation", marks=pytest.mark.slow),
         ("force", -2.0, 4.0, "load"),
         ("indentation", 0.5 - few.HEIGHT, 3.0 - few.HEIGHT, "separation"),
         ("area_fraction", 0.002, 0.006, "separation"),
-        pytest.param("mean_separation", few.HEIGHT - 0.5, few.HEIGHT - 3.0, "separation", marks=pytest.mark.slow),
     ],
 )
 def test_turning_points_are_hit_exactly(kind, back, forth, control):
@@ -203,9 +185,8 @@ def scattered(count, seed):
     return few.contact_of(heights, 10 * side * (rng.random((count, 2)) - 0.5), period=13 * side)
 
 
-@pytest.mark.parametrize("control", [pytest.param("separation", marks=pytest.mark.slow), "load"])
-def test_every_state_continues_the_history_of_the_state_before_it(control):
-    waypoints = few.travelled(scattered(2, 0), [0.02], unload=True, control=control)
+def test_every_state_continues_the_history_of_the_state_before_it():
+    waypoints = few.travelled(scattered(2, 0), [0.02], unload=True, control="load")
     for before, after in pairwise(waypoints):
         assert after.state.history[: len(before.state.history)] == before.state.history
     few.closed_again(waypoints)
@@ -272,14 +253,6 @@ def test_the_log_of_events_agrees_with_the_counts():
     assert len(np.unique(where, axis=0)) == len(where)
 
 
-def test_a_turning_point_beyond_the_model_is_refused_before_anything_runs():
-    surface = paraboloid(32, 16.0)
-    beyond = 1.01 * MAX_REDUCED_PRESSURE * float(surface.rms_slope)
-    path = Path([1e-3], turning_points=[("reduced_pressure", 0.0), ("relative_load", beyond)])
-    with pytest.raises(ValueError, match=r"^path: relative_load = .*beyond the range of the asperity model"):
-        icha.simulate(surface, few.STICKY, path)
-
-
 def test_an_edge_of_contact_within_the_accuracy_of_the_solver_is_passed():
     """A sticky bump, as wide as a quarter of the cell, is drawn off; near the end no step is too short to go on."""
     n, period = 64, 100e-6
@@ -293,81 +266,3 @@ def test_an_edge_of_contact_within_the_accuracy_of_the_solver_is_passed():
     most = 1.5 * np.pi * 0.05 * radius / period**2
     assert float(run.pull_off_pressure) == pytest.approx(most, rel=1e-6)
     assert float(run.detachment_pressure) == pytest.approx(-5 / 9 * most, rel=1e-3)
-
-
-def test_a_tension_that_is_never_reached_is_said_to_be_so():
-    contact = few.contact_of([few.HEIGHT], [(0, 0)])
-    path = Path(reduced_pressures=[0.005], turning_points=[("reduced_pressure", -0.1)])
-    with pytest.raises(NotConverged, match=r"apart before the turning point reduced_pressure = -0.1; the largest"):
-        list(follow(contact, path))
-
-
-@pytest.mark.parametrize("load", [7e-4, 1.1e-3, 1.3e-3, 2e-3, 3e-3])
-def test_under_load_no_stop_is_lost_at_the_load_of_another(load):
-    """Equilibria are found to some 1e-11 of their load: of two at the same, the second may have a little less."""
-    surface = paraboloid(32, 16.0)
-    snapshots = [("relative_load", load * surface.rms_slope)]
-    path = Path([load, 2 * load], snapshots=snapshots, unload=True, control="load")
-    run = icha.simulate(surface, Material(1.0, 0.0, 1.0), path)
-    asked = sorted(str(kind) for kind in run.step_kind.values[run.leg.values == 0] if kind != "path")
-    assert asked == ["reduced_pressure", "reduced_pressure", "relative_load"]
-    assert "relative_load" in run.snapshot_kind.values
-
-
-class Touchy(InteractingAsperities):
-    """On unloading it finds no equilibrium in steps of some lengths, m, and no load that is too far away."""
-
-    lengths, farthest = (0.0, 0.0), np.inf
-
-    def equilibrium(self, state, separation, control=None, *, let_go=0):
-        way, (least, most) = separation - state.separation, self.lengths
-        if least < way < most or (control and way > self.farthest):
-            raise NotConverged("on purpose")
-        return super().equilibrium(state, separation, control, let_go=let_go)
-
-
-def touchy(lengths, farthest=np.inf):
-    one = few.contact_of([few.HEIGHT], material=few.BARE)
-    contact = Touchy(one.law, one.asperities, one.rms_height, one.rms_slope)
-    object.__setattr__(contact, "lengths", lengths)
-    object.__setattr__(contact, "farthest", farthest)
-    return contact
-
-
-@pytest.mark.parametrize("stride", [1.5, 1e-4])
-def test_a_step_that_fails_is_halved_whatever_the_one_before(stride):
-    contact = touchy((0.6, np.inf))
-    start = contact.equilibrium(contact.untouched(), few.HEIGHT - 3.0)
-    cycle = _Cycle(contact, 1.5, PathProgress(contact, 1, 1.5), start, stride, StepAccuracy(contact, 1.5), leg=1)
-    state, step = cycle.find_next_equilibrium(1.0)
-    assert (
-        step.separation_change == pytest.approx(0.5) and state.separation == start.separation + step.separation_change
-    )
-
-
-def test_a_load_that_is_not_met_before_a_station_is_met_in_shorter_steps():
-    """The next station, 0.75 away, is reached at once, but nothing half way there, nor the load from so far."""
-    contact = touchy((0.3, 0.6), farthest=0.3)
-    turn = ("reduced_pressure", 4 / 3 * 2.5**1.5 / 1e3)  # Hertz's force at an approach of 2.5
-    waypoints = few.travelled(contact, None, mean_separations=[few.HEIGHT - 3.0], turning_points=[turn], max_step=0.15)
-    assert waypoints[-1].leg == 1
-    assert few.HEIGHT - waypoints[-1].state.separation == pytest.approx(2.5, abs=1e-6)
-
-
-class InterfaceOnly:
-    """Only those attributes of a contact that the interface of contact models names."""
-
-    def __init__(self, contact):
-        self._contact = contact
-
-    def __getattr__(self, name):
-        if name not in {*vars(ContactModel), *ContactModel.__annotations__}:
-            raise AttributeError(f"{name} is not in the interface")
-        return getattr(self._contact, name)
-
-
-@pytest.mark.parametrize("settings", [{}, {"unload": True, "control": "load"}], ids=str)
-def test_a_path_needs_no_more_of_a_contact_than_the_interface(settings):
-    contact = few.contact_of([few.HEIGHT, few.HEIGHT], [[-4, 0], [4, 0]])
-    expected, found = (few.travelled(each, [0.001, 0.005], **settings) for each in (contact, InterfaceOnly(contact)))
-    assert [w.state.separation for w in found] == [w.state.separation for w in expected]

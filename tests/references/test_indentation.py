@@ -156,25 +156,3 @@ def test_loading_of_a_sphere_starts_with_a_jump_and_unloading_ends_at_the_smalle
         assert a[unloading][0] == pytest.approx(float(ends[control](RADIUS, MODULUS, WORK).contact_radius), abs=2e-8)
         assert np.all(np.diff(np.flatnonzero(loading)) == 1) and np.all(np.diff(np.flatnonzero(unloading)) == 1)
         assert loading[-1] and unloading[-1]
-
-
-def test_unknown_control_is_refused():
-    with pytest.raises(ValueError, match="control: 'load' must be one of indentation, force"):
-        closed.stable_branches(closed.sphere_contact(RADII, RADIUS, MODULUS), "load")
-
-
-def test_waves_make_the_contact_jump_and_raise_the_pull_off_force():
-    # Guduru (2007): the pull-off force exceeds that of a smooth sphere; contact advances and recedes in jumps.
-    a = np.linspace(1e-7, 2e-4, 40001)
-    states = closed.wave_contact(a, CREST, MODULUS, WORK)
-    assert (
-        states.force[closed.stable_branches(states)[1]].min()
-        < 1.5 * closed.sphere_pull_off(RADIUS, MODULUS, WORK).force
-    )
-    for branch in closed.stable_branches(states):
-        on_branch = np.flatnonzero(branch)
-        before = np.flatnonzero(np.diff(on_branch) > 1)
-        assert len(before) > 3 and np.all(np.diff(a[on_branch])[before] < 1.5 * CREST.wavelength)
-        # The indentation rises with the radius and is the same on both sides of a jump.
-        rise = np.diff(states.indentation[branch])
-        assert np.all(rise > 0) and np.all(rise[before] <= np.max(np.abs(np.diff(states.indentation))))

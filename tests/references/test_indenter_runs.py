@@ -16,9 +16,8 @@ from icha.references.indenter_runs import (
     first_approach,
     loop_values,
     reason_without_fit,
-    spaced_states,
 )
-from icha.surfaces.shapes import Cone, Paraboloid, Sphere, describe_shape
+from icha.surfaces.shapes import Cone, Sphere
 
 SIDE, MODULUS, RADIUS, ENERGY = 64e-6, 1e6, 1e-3, 0.05
 SMOOTH = icha.Surface(np.zeros((64, 64)), SIDE, "free", Sphere(RADIUS))
@@ -137,11 +136,6 @@ def test_a_run_states_why_it_has_no_fit(reach, count, reason):
     assert not reason_without_fit(run.assign(work_of_adhesion_approach=ENERGY), "approach")
 
 
-def test_states_for_a_fit_are_spread_over_the_indentation():
-    crowded = np.concatenate([np.linspace(0, 1, 11), 0.5 + 1e-6 * np.arange(1000)])
-    assert spaced_states(crowded).tolist() == list(range(11))
-
-
 def test_hull_of_cells():
     grid = 20
     square = np.zeros((grid, grid), bool)
@@ -160,12 +154,6 @@ def test_share_of_discs_at_the_edges_of_a_square():
     assert edge_share(10.0, 10, np.array([[0.5, 4.5]]), np.array([2.0])) == pytest.approx(0.5)
     assert edge_share(10.0, 10, np.array([[0.5, 8.5], [4.5, 4.5]]), np.array([1.0, 1.0])) == pytest.approx(0.375)
     assert edge_share(10.0, 10, np.zeros((0, 2)), np.zeros(0)) == 0
-
-
-def test_descriptions_of_shapes():
-    assert describe_shape(Sphere(1e-3)) == "sphere of radius 0.001 m"
-    assert describe_shape(Paraboloid((1e-3, 2e-3))) == "paraboloid of radii 0.001 and 0.002 m"
-    assert describe_shape(Cone(1.5)) == "cone of half angle 1.5 rad"
 
 
 def test_run_of_a_smooth_sphere_has_the_values_of_jkr():
@@ -198,24 +186,6 @@ def test_contact_at_the_edges_of_a_scan_is_said():
     )
     assert float(run["edge_contact"].max()) > 0.5
     assert "in the outermost cells of the square" in run.attrs["applicability"]
-
-
-def test_contact_of_a_shape_at_the_edge_ends_the_path_in_words():
-    path = icha.Path(indentations=[1e-7, 2e-6])
-    with pytest.raises(icha.ConvergenceError, match="reaches the edge of the square of side") as error:
-        icha.simulate(SMOOTH, icha.Material(MODULUS, 0.0, 1e-9), path, model="boundary_elements")
-    assert "reaches the edge" in error.value.dataset.attrs["beyond_model"]
-    assert error.value.dataset.sizes["step"] == 1
-
-
-def test_target_that_the_first_jump_passes_does_not_fail_checks():
-    """Adhesion spreads the contact at once to more than the target, which is met on the branch after the jump."""
-    material = icha.Material(MODULUS, (6e-6) ** 3 * MODULUS / RADIUS**2, 1e-12)
-    path = icha.Path(contact_radii=[1e-5, 1.2e-5], unload=True)
-    run = icha.simulate(SMOOTH, material, path, model="boundary_elements")
-    first = int(np.flatnonzero(run["step_kind"] == "contact_radius")[0])
-    assert run["contact_radius"][first - 1] > run["contact_radius"][first] == pytest.approx(1e-5)
-    assert "failed_checks" not in run.attrs
 
 
 def test_asperities_refuse_shapes():

@@ -36,13 +36,6 @@ def test_fingerprints_contain_the_modules_that_a_task_uses():
         assert {task for task, modules in used.items() if f"icha.{module}" in modules} == tasks, module
 
 
-def test_fingerprints_of_contact_models_are_separate():
-    asperities, patches = (set(imported_modules(RUN, model.module)) for model in MODELS.values())
-    assert any(".equilibrium." in name for name in asperities - patches)
-    assert "icha.boundary_elements.contact" in patches - asperities
-    assert not any(".equilibrium." in name for name in patches - asperities)
-
-
 def test_scripts_count_with_the_modules_that_they_import(tmp_path):
     script = tmp_path / "script.py"
     prints = {}

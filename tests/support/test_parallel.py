@@ -4,19 +4,9 @@ import numpy as np
 import pytest
 
 from icha import SelfAffineSpectrum
-from icha.support.parallel import on_cores
 from icha.surfaces.summits import find_summits
 
 PERIOD = 100e-6
-
-
-@pytest.mark.parametrize("threads", ["1", "4"])
-def test_results_come_in_the_order_of_the_items(monkeypatch, threads):
-    monkeypatch.setenv("OMP_NUM_THREADS", threads)
-    assert on_cores(lambda k: k**2, range(50)) == [k**2 for k in range(50)]
-    assert on_cores(len, []) == []
-    with pytest.raises(ZeroDivisionError):
-        on_cores(lambda k: 1 / k, [2, 1, 0])
 
 
 @pytest.mark.filterwarnings("ignore:grid")

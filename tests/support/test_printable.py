@@ -2,7 +2,6 @@
 
 import sys
 import unicodedata
-from types import SimpleNamespace
 
 import netCDF4
 import pytest
@@ -11,7 +10,6 @@ from typer.testing import CliRunner
 
 from icha.cli import app
 from icha.cli.project import UserError, echo, reports_errors
-from icha.cli.run import _print_reasons
 from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import write_surface
 from icha.report.template import template
@@ -45,14 +43,6 @@ def test_commands_say_nothing_else(capsys):
     out, err = capsys.readouterr()
     assert r"\x1b[2J" in out and r"\x1b[2J" in err and err.startswith("two\n")
     assert not set("\x1b\x9b\r\b\x07\x7f\u202e") & set(out + err)
-
-
-def test_messages_of_jobs_are_printable(tmp_path, capsys):
-    (tmp_path / "run.log").write_text(f"working\nError: {EVIL}\nmore \x1b[1A\n", encoding="utf-8")
-    _print_reasons(tmp_path, tmp_path / "snakemake.log", 0, SimpleNamespace(called=0, finished=set()), stopped=False)
-    out = capsys.readouterr().out
-    assert out.startswith("1 job failed:\n") and r"\x1b[2J" in out
-    assert not set("\x1b\x9b\r\b\x07\x7f\u202e") & set(out)
 
 
 def test_no_text_of_a_file_begins_a_line_of_its_own(tmp_path):

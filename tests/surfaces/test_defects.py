@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 from scans import refused
-from typer.testing import CliRunner
 
 from icha import SelfAffineSpectrum
-from icha.cli import app
 from icha.cli.scans import describe_scan
 from icha.surfaces.measured.defects import find_outliers, level_lines, line_offsets
 from icha.surfaces.measured.resolution import examine_scan
@@ -87,11 +85,6 @@ def test_dust_of_any_width_is_found_and_replaced(examined, width):
     assert found.rms_slope == pytest.approx(examined(PLAIN).surface.rms_slope, rel=0.03)
 
 
-def test_peaks_and_pits_without_steep_edges_are_no_outliers():
-    for heights in (np.minimum(PLAIN, 0.0), -np.abs(PLAIN), PLAIN + 8 * RMS * np.exp(-20 * (X**2 + Y**2))):
-        assert not find_outliers(heights)[0].any()
-
-
 def test_more_outliers_than_can_be_replaced_are_refused(examined):
     heights = np.where(RNG.random(PLAIN.shape) < 0.3, 40 * RMS, PLAIN)
     with pytest.raises(UnfitTopography, match=r"of 4096 points that stand out .* at most 20 %. Write keep") as raised:
@@ -165,6 +158,15 @@ def test_offsets_curvature_and_anisotropy_are_said(examined):
     assert not any(word in lines(examined(PLAIN)) for word in ("outlier", "steps from", "paraboloid", "anisotropic"))
 
 
+def test_many_filled_points_and_edges_that_do_not_fit_are_said(examined):
+    holey = PLAIN.copy()
+    holey[20:45, 10:40] = np.nan
+    assert "warning: more than 5 % of the heights are interpolated" in lines(examined(holey, missing="fill"))
+    for heights, fits in ((PLAIN, True), (PLAIN + 5 * RMS * X, False)):
+        said = lines(examined(heights, boundary="periodic", detrend="none"))
+        assert ("`boundary: periodic`, but opposite edges differ" in said) != fits
+
+
 def test_the_share_of_noise_after_the_filter_is_that_of_filtered_noise(examined):
     noise = 0.05 * RMS * np.random.default_rng(3).normal(size=PLAIN.shape)
     scan = examined(PLAIN + noise, cutoff=3e-6)
@@ -195,36 +197,3 @@ def test_a_filled_outlier_is_no_reason_for_a_cut_off(examined):
     assert "cutoff" not in scan.advice and "recommended: `cutoff" not in lines(scan)
     noisy = examined(PLAIN + 0.2 * RMS * np.random.default_rng(4).normal(size=PLAIN.shape))
     assert "cutoff" in noisy.advice
-
-
-CAMPAIGN = """
-name: grooves
-title: T
-summary: S
-license: CC0-1.0
-surfaces:
-  ground: {kind: measured, path: ground.npy, height_unit: um, size: 32 um, boundary: free}
-materials:
-  bare: {contact_modulus: 2 GPa, surface_energy: 0 J/m^2}
-studies:
-  load:
-    surfaces: [ground]
-    rms_slopes: measured
-    materials: [bare]
-    targets: {area_fractions: [0.01]}
-"""
-
-
-def test_describe_quotes_no_accuracy_for_grooves_and_draws_the_preparation(tmp_path, monkeypatch):
-    grooved = SelfAffineSpectrum(SIDE, 16e-6, 4e-6, 0.8, rms_slope=0.04).realise(GRID, 2).heights
-    wavy = np.fft.ifft2(np.fft.fft2(grooved) * (np.abs(np.fft.fftfreq(GRID))[None] < 0.02)).real
-    np.save(tmp_path / "ground.npy", (wavy + 0.05 * grooved) * 1e6)
-    (tmp_path / "grooves.yaml").write_text(CAMPAIGN, encoding="utf-8")
-    monkeypatch.chdir(tmp_path)
-    result = CliRunner().invoke(app, ["describe", "grooves.yaml", "--plot"])
-    assert result.exit_code == 0, result.output
-    assert "anisotropic: the largest rms slope" in result.output
-    (accuracy,) = (line for line in result.output.splitlines() if line.startswith("accuracy"))
-    assert accuracy.startswith("accuracy: the accuracy of this campaign is unknown (ground: anisotropy of slopes")
-    assert "before and after the preparation: results/grooves/scan_ground.png" in result.output
-    assert (tmp_path / "results/grooves/scan_ground.png").stat().st_size > 10_000

@@ -1,23 +1,14 @@
 """Every step of the preparation of measured topographies."""
 
-import hashlib
-import importlib.util
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
-from scans import UM, centred, preparation, refused
+from scans import centred, preparation, refused
 
-from icha.configuration.surfaces import MeasuredSurface
-from icha.configuration.topographies import inspect_file
 from icha.datasets.files import read_dataset
 from icha.datasets.surface_file import read_surface, write_surface
 from icha.surfaces.measured.settings import UnfitTopography
 from icha.surfaces.measured.topography import prepared_topography
 from icha.surfaces.spectrum import SelfAffineSpectrum
-
-TOPOGRAPHIES = Path(__file__).parents[2] / "config" / "topographies"
 
 
 @pytest.fixture
@@ -154,34 +145,6 @@ def test_pixels_that_are_not_square_are_resampled(prepared, boundary, grid, turn
     assert surface.grid == (2 * n if boundary == "mirror" else n)
 
 
-def rough_at(x, y):
-    """Heights of some waves, none shorter than 0.13, and of no period of the squares below."""
-    rng = np.random.default_rng(7)
-    q = rng.normal(size=(60, 2))
-    q *= (rng.uniform(6, 48, 60) / np.hypot(*q.T))[:, None]
-    phases = rng.uniform(0, 2 * np.pi, 60)
-    return sum(np.cos(qx * x + qy * y[:, None] + p) / np.hypot(qx, qy) for (qx, qy), p in zip(q, phases, strict=True))
-
-
-def test_square_pixels_keep_the_slope(prepared):
-    """As in a file of 128 nm x 315 nm: the slope is that of the same surface with square pixels of 128 nm."""
-    dx, dy, n = 0.0128, 0.0315, 160
-    x, y = (np.arange(n) + 0.5) * dx, (np.arange(80) + 0.5) * dy
-    result = prepared(rough_at(x, y), boundary="free", size=(n * dx, 80 * dy))
-    # 65 long pixels are 159.96 short ones.
-    n = 159
-    assert result.surface.period == pytest.approx(n * dx, rel=1e-12) and result.surface.grid == n
-    assert "resampled to 159 x 159 square ones, by the cosine series along y" in result.description
-    # The largest square in the middle begins where a long pixel does.
-    along = (np.arange(n) + 0.5) * dx
-    square = prepared(rough_at(along, (80 - 65) // 2 * dy + along), boundary="free", size=(n * dx, n * dx))
-    difference = result.surface.heights - square.surface.heights
-    inside = slice(8, -8)
-    # Near the edges across long pixels the cosine series is flat, and the scan is not.
-    assert np.std(difference[inside]) < 0.02 * square.surface.rms_height
-    assert result.surface.rms_slope == pytest.approx(square.surface.rms_slope, rel=0.02)
-
-
 @pytest.mark.parametrize("boundary", ["periodic", "free", "mirror"])
 def test_the_cutoff_is_that_of_iso_16610(prepared, boundary):
     """A wave of the length of the nesting index is halved, one of twice it keeps 2^(-1/4), one of half it 2^-4."""
@@ -210,22 +173,11 @@ def test_a_flat_file_is_refused(prepared, boundary, detrend, degree):
         prepared(0.1 + degree * 0.3 * x - (degree == 2) * 0.07 * y**2, boundary=boundary, detrend=detrend, taper=0.1)
 
 
-def test_fine_roughness_on_a_high_step_is_none_of_rounding(prepared):
-    """Nanometres on an offset of a metre."""
-    rough = 1e-9 * np.random.default_rng(2).normal(size=(12, 12))
-    surface = prepared(1.0 + rough, boundary="free").surface
-    np.testing.assert_allclose(surface.heights, centred(rough), atol=3e-16)
-
-
 @pytest.mark.parametrize(
     ("heights", "key", "words"),
     [
         (np.empty((0, 0)), "path", "of shape"),
-        (np.empty((0, 12)), "path", "of shape"),
-        (np.empty((12, 0)), "path", "of shape"),
-        (np.ones((1, 1)), "path", "a square of 1 x 1 points"),
         (np.arange(12.0)[None], "path", "is a line scan, one profile of 12 points"),
-        (np.arange(12.0)[:, None], "path", "is a line scan"),
         (np.arange(24.0).reshape(12, 2), "path", "is a line scan"),
         (np.full((12, 12), np.nan), "path", "no height"),
         (np.where(np.eye(12) > 0, np.arange(12.0), np.nan), "missing", "cannot fill 132 of 144"),
@@ -237,48 +189,6 @@ def test_too_little_for_a_surface(prepared, heights, key, words, detrend):
     missing = "fill" if "cannot fill" in words else "refuse"
     with refused(key, words):
         prepared(heights, boundary="free", detrend=detrend, missing=missing, size=(6.0, 6.0))
-
-
-def test_messages_have_units_of_people(prepared):
-    crop = {"x": 7 * UM, "y": 0.0, "side": 2.5 * UM}
-    with pytest.raises(UnfitTopography, match=r"ends at x = 9.5 um, y = 2.5 um, .* at most x = 4 um, y = 3 um"):
-        prepared(np.eye(12, 16), size=(4e-6, 3e-6), crop=crop)
-    with pytest.raises(UnfitTopography, match=r"requires a square scan .* 4 um x 3 um"):
-        prepared(np.eye(12, 16), size=(4e-6, 3e-6), boundary="periodic")
-
-
-def test_provenance_and_facts(prepared, tmp_path):
-    heights = np.random.default_rng(4).normal(size=(10, 10))
-    result = prepared(heights, boundary="free", detrend="tilt")
-    assert result.source_file == "scan.npy"
-    assert result.source_sha256 == hashlib.sha256((tmp_path / "scan.npy").read_bytes()).hexdigest()
-    assert str(tmp_path) not in result.description
-    keys = {"kind": "measured", "path": str(tmp_path / "scan.npy"), "height_unit": "m", "size": "5 m"}
-    section = MeasuredSurface.model_validate(keys | {"boundary": "free", "detrend": "tilt"})
-    facts = inspect_file(section)
-    assert (facts.grid, facts.period, facts.sha256) == (10, 5.0, result.source_sha256)
-    assert facts.rms_slope == pytest.approx(result.surface.rms_slope, rel=1e-5)
-    # A file that changes is read again.
-    np.save(tmp_path / "scan.npy", np.pad(heights, 1))
-    assert inspect_file(section).grid == 12
-
-
-def test_synthetic_scan_is_what_its_script_makes(tmp_path):
-    spec = importlib.util.spec_from_file_location("make_scan", TOPOGRAPHIES / "make_synthetic_scan.py")
-    script = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(script)
-    script.write(tmp_path / "again.txt")
-    assert (tmp_path / "again.txt").read_bytes() == (TOPOGRAPHIES / "synthetic_scan.txt").read_bytes()
-    section = MeasuredSurface.model_validate(
-        {
-            "kind": "measured", "path": "synthetic_scan.txt", "height_unit": "nm", "size": ["72 um", "64 um"],
-            "missing": "fill", "detrend": "curvature", "boundary": "mirror",
-        }
-    )  # fmt: skip
-    result = prepared_topography(TOPOGRAPHIES / "synthetic_scan.txt", json.loads(json.dumps(section.preparation)))
-    assert result.surface.grid == 256 and result.surface.period == pytest.approx(128e-6)
-    # What was put in: slopes of 0.15 of the roughness; the scratch and the filled points add a little.
-    assert 0.12 < result.surface.rms_slope < 0.2
 
 
 def test_surface_file_says_where_a_measurement_comes_from(tmp_path, prepared):

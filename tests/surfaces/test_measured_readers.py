@@ -9,7 +9,7 @@ import h5py
 import netCDF4
 import numpy as np
 import pytest
-from scans import COLUMNS, HEIGHTS, NM, ROWS, SIZE, UM, assert_read, centred, preparation, refused, scan, write_xyz
+from scans import COLUMNS, HEIGHTS, NM, ROWS, SIZE, UM, assert_read, preparation, refused, scan, write_xyz
 from scipy.io import savemat
 from SurfaceTopography.Exceptions import CorruptFile
 
@@ -21,21 +21,6 @@ from icha.surfaces.measured.topography import prepared_topography
 def test_npy(tmp_path, first_axis, stored):
     np.save(tmp_path / "scan.npy", stored)
     assert_read(scan(tmp_path / "scan.npy", height_unit=NM, size=SIZE, first_axis=first_axis))
-
-
-@pytest.mark.parametrize("turned", [False, True])
-def test_arrays_of_points_are_asked_for_as_text(tmp_path, turned):
-    points = np.random.default_rng(1).normal(size=(1000, 3))
-    np.save(tmp_path / "scan.npy", points.T if turned else points)
-    with refused("path", r"seems to be points x y z; .*`format: xyz` and a text file"):
-        scan(tmp_path / "scan.npy", height_unit=NM, size=SIZE)
-
-
-@pytest.mark.parametrize(("first_axis", "stored"), [("y", HEIGHTS), ("x", HEIGHTS.T)])
-def test_matrix_of_text(tmp_path, first_axis, stored):
-    lines = [",".join(f"{height:.4f}" for height in row) for row in stored]
-    (tmp_path / "scan.txt").write_text("# a remark\n\n" + "\n".join(lines) + "\n")
-    assert_read(scan(tmp_path / "scan.txt", height_unit=NM, size=SIZE, first_axis=first_axis))
 
 
 def test_first_axis_exchanges_rows_and_cells(tmp_path):
@@ -57,26 +42,6 @@ def test_xyz_in_any_order(tmp_path, separator):
     wide = scan(tmp_path / "scan.txt", height_unit=NM, lateral_unit=UM)
     np.testing.assert_allclose(wide.size, np.multiply(SIZE, 1000))
     assert_read(scan(tmp_path / "scan.txt", height_unit=NM, lateral_unit=UM, size=SIZE))
-
-
-def test_text_files_of_the_challenge(tmp_path):
-    """Remarks, numbers with commas and blanks between them, an empty line after every line of points."""
-    x = np.arange(8) / 8
-    heights = np.round(np.random.default_rng(2).normal(size=(8, 8)), 5)
-    lines = ["# surface", "# x, y, h"]
-    for row, y in zip(heights, x, strict=True):
-        lines += [f"{x_k:.6f}, {y:.6f}, {h:.5f}" for x_k, h in zip(x, row, strict=True)] + [""]
-    (tmp_path / "surface.0008x0008.ASCII.xyz.dat").write_text("\n".join(lines) + "\n")
-    matrix = "\n".join(", ".join(f"{h:.5f}" for h in row) + "," for row in heights)
-    (tmp_path / "surface.0008x0008.ASCII.dat").write_text(f"# surface\n{matrix}\n")
-    for name, keys in (
-        ("surface.0008x0008.ASCII.xyz.dat", {"lateral_unit": 1e-4}),
-        ("surface.0008x0008.ASCII.dat", {"size": (1e-4, 1e-4)}),
-    ):
-        settings = preparation(boundary="periodic", height_unit=1e-4, touches_first="low", **keys)
-        surface = prepared_topography(tmp_path / name, settings).surface
-        np.testing.assert_allclose(surface.heights, -1e-4 * centred(heights), atol=1e-18)
-        assert surface.period == pytest.approx(1e-4, rel=1e-12)
 
 
 def test_xyz_written_with_few_digits(tmp_path):
@@ -123,13 +88,6 @@ def write_netcdf(path, turned=False, backwards=False, names=("y", "x"), unit="nm
 @pytest.mark.parametrize("keys", [{}, {"turned": True}, {"backwards": True}, {"turned": True, "backwards": True}])
 def test_netcdf_says_its_axes_and_units(tmp_path, keys):
     assert_read(scan(write_netcdf(tmp_path / "scan.nc", **keys)))
-
-
-def test_netcdf_with_axes_of_other_names(tmp_path):
-    path = write_netcdf(tmp_path / "scan.nc", names=("row", "column"), turned=True)
-    assert_read(scan(path, first_axis="x"))
-    with refused("data", r"phase, height|height, phase"):
-        scan(path, data="width")
 
 
 def test_netcdf_fill_values_are_missing_points(tmp_path):
@@ -332,41 +290,6 @@ def test_a_damaged_text_of_an_instrument_is_refused_as_one(tmp_path, monkeypatch
         monkeypatch.setattr("SurfaceTopography.open_topography", corrupt)
 
 
-# As Gwyddion writes them, with its labels in the language of its menus.
-ENGLISH = ("Channel", "Width", "Height", "Value units")
-GERMAN = ("Kanal", "Breite", "Höhe", "Value units")
-
-
-@pytest.mark.parametrize("labels", [ENGLISH, GERMAN])
-@pytest.mark.parametrize("columns", [COLUMNS, 3])
-def test_heading_of_images_that_gwyddion_exports(tmp_path, labels, columns):
-    """Also where three numbers in a line would be taken for coordinates."""
-    heights = HEIGHTS[:, :columns] * 1e-9
-    values = ("Topography", f"{0.25 * columns:.2f} µm", f"{250 * ROWS:.1f} nm", "m")
-    heading = [f"# {label}: {value}" for label, value in zip(labels, values, strict=True)]
-    lines = ["\t".join(f"{height:.6e}" for height in row) for row in heights]
-    (tmp_path / "scan.txt").write_text("\n".join([*heading, *lines]) + "\n", encoding="utf-8")
-    for kind in ("auto", "matrix"):
-        read = scan(tmp_path / "scan.txt", format=kind)
-        np.testing.assert_allclose(read.heights, heights, rtol=1e-6)
-        np.testing.assert_allclose(read.size, (columns * 0.25 * UM, SIZE[1]), rtol=1e-6)
-    np.testing.assert_allclose(scan(tmp_path / "scan.txt", height_unit=UM).heights, heights * UM, rtol=1e-6)
-
-
-@pytest.mark.parametrize("encoding", ["utf-8", "cp1252"])
-def test_heading_of_points_that_gwyddion_exports(tmp_path, encoding):
-    path = write_xyz(tmp_path / "scan.xyz")
-    units = "# Channel: Topography\n# Lateral units: {}\n# Value units: {}\n"
-    text = path.read_text()
-    path.write_text(units.format("nm", "nm") + text, encoding=encoding)
-    assert_read(scan(path))
-    path.write_text(units.format("µm", "nm") + text, encoding=encoding)
-    np.testing.assert_allclose(scan(path).size, np.multiply(SIZE, 1000))
-    # Given units replace those of the file.
-    assert_read(scan(path, lateral_unit=NM))
-    assert_read(scan(path, lateral_unit=NM, height_unit=UM), UM)
-
-
 @pytest.mark.parametrize(
     ("name", "text"),
     [
@@ -468,22 +391,6 @@ def test_first_axis_against_the_file_is_refused(tmp_path):
         scan(write_xyz(tmp_path / "scan.xyz"), height_unit=NM, lateral_unit=NM, first_axis="x")
 
 
-def test_arrays_of_matlab_that_are_no_heights(tmp_path):
-    """Structs contain maps; complex, logical and cell arrays, texts and axes are no maps."""
-    path = tmp_path / "scan.mat"
-    cell = np.empty((1, 2), object)
-    cell[:] = [[HEIGHTS, "text"]]
-    others = {"x": np.arange(COLUMNS), "y": np.arange(ROWS)[:, None], "name": "a scan", "mask": HEIGHTS > 0}
-    savemat(path, {"scan": {"Z": HEIGHTS, "unit": "nm"}, "phase": 1j * HEIGHTS, "cell": cell, **others})
-    assert_read(scan(path, **LINES))
-    assert_read(scan(path, data="scan/Z", **LINES))
-    savemat(path, {"Z": np.round(1e4 * HEIGHTS).astype("i4")})
-    assert_read(scan(path, height_unit=1e-4 * NM, size=SIZE))
-    savemat(path, {"phase": 1j * HEIGHTS, **others})
-    with refused("data", "has 2 real arrays; expected one of: x, y"):
-        scan(path, **LINES)
-
-
 @pytest.mark.parametrize("attribute", [True, False])
 @pytest.mark.parametrize("block", [0, 512])
 def test_new_files_of_matlab_are_the_right_way_round(tmp_path, attribute, block):
@@ -506,28 +413,13 @@ def test_new_files_of_matlab_are_the_right_way_round(tmp_path, attribute, block)
     assert read.format == "matlab"
 
 
-@pytest.mark.parametrize("name", ["scan.dat", "scan", "scan.hdf"])
-def test_hdf5_is_known_by_its_signature(tmp_path, name):
-    with h5py.File(tmp_path / name, "w") as file:
-        file["height"] = HEIGHTS[None, None]
-    assert_read(scan(tmp_path / name, **LINES))
-
-
-@pytest.mark.parametrize("name", ["scan.nc", "scan.cdf"])
-def test_leading_dimensions_of_one_entry_are_passed_over(tmp_path, name):
-    assert_read(scan(write_netcdf(tmp_path / name, leading=("time",))))
-
-
 @pytest.mark.parametrize(
     ("values", "size"),
     [
         (np.array([f"c{k}" for k in range(COLUMNS)], object), None),
         (np.arange(COLUMNS), None),
-        (np.full(COLUMNS, np.nan), None),
         (np.arange(COLUMNS) ** 2.0, "unequal steps"),
-        (np.where(np.arange(COLUMNS) == 3, np.nan, np.arange(COLUMNS)), "unequal steps"),
         (np.r_[0, 2, 1, 3:COLUMNS], "unequal steps"),
-        (np.zeros(COLUMNS), "unequal steps"),
     ],
 )
 def test_netcdf_coordinates_of_other_kinds(tmp_path, values, size):

@@ -12,25 +12,9 @@ from icha.datasets.files import read_dataset
 from icha.datasets.surface_file import read_spectral_moments, write_surface
 from icha.surfaces.moments import SpectralMoments, radial_power_spectrum, spectral_moments
 
-MATERIAL = Material(25e6, 0.05, 2.071e-9)
-
 
 def rough(seed=1, short=100e-6 / 24):
     return SelfAffineSpectrum(100e-6, 25e-6, short, 0.8).realise(grid=256, seed=seed)
-
-
-@pytest.mark.parametrize(("hurst", "of_1_e", "of_sal"), [(0.8, 4.1, 3.1), (0.5, 5.0, 3.5)])
-def test_the_correlation_length_as_messages_and_faq_relate_it_to_the_roll_off(hurst, of_1_e, of_sal):
-    surface = SelfAffineSpectrum(16.0, 1.0, 1 / 8, hurst).realise(grid=512, seed=1)
-    power = np.abs(np.fft.fft2(surface.heights)) ** 2
-    correlation = np.fft.ifft2(power).real
-    # Profiles along both axes; fixed amplitudes make the sum over all directions nearly exact.
-    along = (correlation[0] + correlation[:, 0])[:64] / (2 * correlation[0, 0])
-    lags = np.arange(64) * surface.spacing
-    for level, expected in ((np.exp(-1), of_1_e), (0.2, of_sal)):
-        first = np.argmax(along < level)
-        length = np.interp(-level, -along[first - 1 : first + 1], lags[first - 1 : first + 1])
-        assert 1.0 / length == pytest.approx(expected, rel=0.06)
 
 
 def test_moments_are_variances_of_profiles():
@@ -66,24 +50,6 @@ def test_nayak_parameter_of_one_wavelength_and_of_two():
     assert spectral_moments(Surface(one + 0.3 * other, 1e-4)).nayak_parameter == pytest.approx(expected, rel=1e-12)
 
 
-def test_nayak_parameter_of_a_self_affine_spectrum_is_that_of_its_continuum():
-    def moment(order, q0=4.0, q1=24.0, hurst=0.8):
-        exponent = order + 1 - 2 * (1 + hurst)
-        return (q0 ** (order + 1 + 1) - 1) / (order + 2) + q0 ** (2 * (1 + hurst)) * (
-            q1 ** (exponent + 1) - q0 ** (exponent + 1)
-        ) / (exponent + 1)
-
-    alpha = 1.5 * moment(0) * moment(4) / moment(2) ** 2
-    # The longest waves are few, so the lattice's variance of height differs from the integral.
-    assert spectral_moments(rough()).nayak_parameter == pytest.approx(alpha, rel=0.1)
-
-
-def test_heights_scale_all_moments_alike():
-    moments, scaled = spectral_moments(rough()), spectral_moments(rough().scaled_to_rms_slope(0.2))
-    np.testing.assert_allclose(moments.scaled_to_rms_slope(0.2), scaled, rtol=1e-12)
-    assert scaled.nayak_parameter == pytest.approx(moments.nayak_parameter, rel=1e-12)
-
-
 def test_surface_files_hold_the_moments(tmp_path):
     surface = rough()
     write_surface(tmp_path / "surface.nc", surface, name="rough", seed=1)
@@ -108,19 +74,6 @@ def test_stickiness_is_the_attraction_beside_hertzian_contacts():
     attraction = material.surface_energy / material.interaction_range * math.pi * reach / width
     repulsion = material.contact_modulus * slope / 2
     assert stickiness(moments, material) == pytest.approx(attraction / repulsion, rel=1e-3)
-
-
-def test_surfaces_stick_where_the_published_inequality_holds():
-    # (h' r E*/(2 dgamma)) [h' d/(4 r)]^(2/3) < pi (3/16)^(2/3), d = 4 h'/h''.
-    moments = spectral_moments(rough())
-    for energy in np.geomspace(1e-3, 1e2, 11):
-        material = Material(25e6, energy, 2e-9)
-        slope, reach = moments.rms_slope, material.interaction_range
-        width = 4 * slope / moments.rms_laplacian
-        left = slope * reach * 25e6 / (2 * energy) * (slope * width / (4 * reach)) ** (2 / 3)
-        bound = math.pi * (3 / 16) ** (2 / 3)
-        assert stickiness(moments, material) == pytest.approx(bound / left, rel=1e-12)
-    assert bound == pytest.approx(1.03, abs=2e-3)
 
 
 def test_power_spectrum_is_that_of_the_synthesis():

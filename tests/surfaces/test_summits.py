@@ -6,7 +6,7 @@ import scipy.optimize
 from scipy.spatial import cKDTree
 
 from icha import Material, Path, SelfAffineSpectrum, Surface, simulate
-from icha.surfaces.summits import SummitCoverage, find_summits, locate_summits, paraboloid_departure
+from icha.surfaces.summits import find_summits, locate_summits, paraboloid_departure
 
 PERIOD = 100e-6
 SPECTRUM = SelfAffineSpectrum(PERIOD, 20e-6, PERIOD / 16, 0.8)
@@ -134,51 +134,6 @@ def test_oblique_elongated_summits_do_not_depend_on_the_grid(grid):
     np.testing.assert_allclose(summits.height, 1.1e-6, rtol=error / 125)
 
 
-def test_density_of_summits_is_that_of_a_gaussian_surface():
-    # Longuet-Higgins (Nayak): (1/(6 pi sqrt 3)) m4/m2 per area, with the moments of a profile.
-    surface = SelfAffineSpectrum(PERIOD, 20e-6, PERIOD / 32, 0.8).realise(256, 3)
-    _, slope2, laplacian2 = surface.spectral_moments
-    density = (3 / 8 * laplacian2) / (0.5 * slope2) / (6 * np.pi * np.sqrt(3))
-    expected = density * PERIOD**2
-    assert len(find_summits(surface)) == pytest.approx(expected, rel=0.1)
-
-
-def test_turning_and_shifting_the_surface_turns_and_shifts_the_summits():
-    surface = SPECTRUM.realise(128, 4)
-    reference = find_summits(surface)
-
-    def matched(heights, back):
-        summits = find_summits(Surface(heights, PERIOD))
-        assert len(summits) == len(reference)
-        tree = cKDTree(np.mod(back(summits.position), PERIOD), boxsize=PERIOD)
-        distance, index = tree.query(reference.position)
-        assert distance.max() < 1e-6 * surface.spacing
-        np.testing.assert_allclose(summits.height[index], reference.height, rtol=1e-10)
-        np.testing.assert_allclose(summits.radius_of_curvature[index], reference.radius_of_curvature, rtol=1e-7)
-
-    matched(np.roll(surface.heights, (17, -40), axis=(0, 1)), lambda p: p - np.array([-40, 17]) * surface.spacing)
-    # rot90 takes node (row, column) to (n - 1 - column, row).
-    matched(
-        np.rot90(surface.heights),
-        lambda p: np.stack([(127 * surface.spacing - p[:, 1]), p[:, 0]], axis=1),
-    )
-
-
-def test_noise_on_every_node_is_no_obstacle():
-    heights = np.random.default_rng(8).normal(size=(64, 64))
-    summits = find_summits(Surface(heights, 1.0))
-    assert len(summits) + len(summits.unsupported_height) > 0.1 * 64**2
-    assert np.all(np.isfinite(summits.radius_of_curvature))
-    # Two nodes a wave are no evidence of how high a summit is between them.
-    assert len(summits.unsupported_height) > len(summits)
-
-
-def test_a_ridge_without_summits_is_refused():
-    x = 2 * np.pi * np.arange(32) / 32
-    with pytest.raises(ValueError, match="heights"):
-        find_summits(Surface(np.cos(x)[None, :] * np.ones((32, 1)), 1.0))
-
-
 def test_every_summit_of_a_resolved_surface_is_supported():
     """Of smooth surfaces with eight and more nodes per shortest wave nothing is left out but a summit in a thousand."""
     for cells, most in ((12, 0.0), (8, 2e-3), (5, 0.02)):
@@ -212,17 +167,6 @@ def test_no_summit_lies_above_what_its_nodes_support(damage):
     assert found.height.max() < heights.max() + 0.1 * surface.rms_height
     # What lies away from the damage is found as before.
     assert len(found) > 0.5 * len(smooth)
-
-
-def test_a_plateau_is_a_high_place_without_a_summit():
-    surface = SelfAffineSpectrum(1.0, 0.25, 10 / 64, hurst=0.8, rms_slope=0.3).realise(64, 4)
-    whole = SummitCoverage.of(surface, locate_summits(surface))
-    separations = np.array([2.0, 1.0]) * surface.rms_height
-    assert whole.reasons_against(separations) == []
-    cut = Surface(np.minimum(surface.heights, 0.8 * surface.rms_height), 1.0)
-    clipped = SummitCoverage.of(cut, locate_summits(cut))
-    assert clipped.uncovered_share(0.5 * surface.rms_height) > 0.5
-    assert clipped.reasons_against(separations)
 
 
 def test_summits_that_all_lack_support_are_refused_with_what_to_do():

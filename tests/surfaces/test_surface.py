@@ -1,11 +1,13 @@
-"""Spectrum, synthesis and surface statistics against the spectrum's integrals and plain Fourier sums."""
+"""Surfaces: spectrum, synthesis, statistics and shapes against integrals, Fourier sums and definitions."""
 
+import math
 import warnings
 
 import numpy as np
 import pytest
 
 from icha import SelfAffineSpectrum, Surface
+from icha.surfaces.shapes import SHAPES, Cone, CylinderPunch, FlatPunch, Paraboloid, Sphere, Wave
 
 PERIOD = 100e-6
 SPECTRUM = {"period": PERIOD, "rolloff_wavelength": 20e-6, "short_wavelength": PERIOD / 16, "hurst": 0.8}
@@ -59,36 +61,11 @@ def test_statistics_of_one_wave():
     assert surface.rms_slope == pytest.approx(np.pi * n / PERIOD * amplitude, rel=1e-12)
 
 
-def test_challenge_surface_has_its_height():
-    challenge = SelfAffineSpectrum(100e-6, 20e-6, 0.1e-6, 0.8)
-    # The lattice of the cell's waves, by hand: sqrt(27.622/11602) L/(2 pi).
-    assert challenge.rms_height == pytest.approx(0.783e-6, abs=0.0005e-6)
-
-
 @pytest.mark.parametrize("amplitudes", ["fixed", "gaussian"])
 def test_a_finer_grid_holds_the_same_surface(amplitudes):
     spectrum = SelfAffineSpectrum(**SPECTRUM)
     coarse, fine = spectrum.realise(64, 5, amplitudes), spectrum.realise(192, 5, amplitudes)
     np.testing.assert_allclose(fine.heights[::3, ::3], coarse.heights, atol=1e-12 * coarse.rms_height)
-
-
-def test_a_shorter_cut_off_only_adds_waves():
-    long, short = (SelfAffineSpectrum(**(SPECTRUM | {"short_wavelength": PERIOD / m})) for m in (16, 24))
-    spectra = [np.fft.fft2(s.realise(96, 5).heights) for s in (long, short)]
-    held = np.abs(spectra[0]) > 1e-9 * np.abs(spectra[0]).max()
-    phase = np.angle(spectra[1][held] / spectra[0][held])
-    np.testing.assert_allclose(phase, 0, atol=1e-8)
-
-
-def test_phases_are_uniform_and_independent():
-    surface = SelfAffineSpectrum(**SPECTRUM).realise(64, 11)
-    spectrum = np.fft.fft2(surface.heights)
-    unit = spectrum[np.abs(spectrum) > 1e-9 * np.abs(spectrum).max()]
-    unit = unit / np.abs(unit)
-    # Conjugates come in pairs, so that only the cosine is free; three standard deviations.
-    count = len(unit) / 2
-    assert abs(np.mean(unit.real)) < 3 * np.sqrt(0.5 / count)
-    assert abs(np.mean(unit.real**2) - 0.5) < 3 * np.sqrt(0.125 / count)
 
 
 def test_gaussian_amplitudes_follow_an_exponential_law():
@@ -166,16 +143,10 @@ def _with(value):
         np.zeros((16, 16)),
         np.ones((16, 15)),
         np.arange(49.0).reshape(7, 7),
-        np.arange(64.0),
-        np.ones((8, 8, 1)),
         _with(np.nan),
         _with(np.inf),
-        [["a", "b"], ["c", "d"]],
-        None,
         np.full((16, 16), 1j),
         np.ma.masked_greater(np.arange(64.0).reshape(8, 8), 60),
-        np.eye(8, dtype=bool),
-        np.full((8, 8), "1.0"),
     ],
 )
 @pytest.mark.filterwarnings("error")
@@ -190,3 +161,68 @@ def test_bad_lengths_and_slopes_are_refused_by_name(value):
         Surface(_with(0.0), value)
     with pytest.raises(ValueError, match="rms_slope"):
         Surface(_with(0.0), 1.0).scaled_to_rms_slope(value)
+
+
+SMOOTH = [Sphere(1e-3), Paraboloid((1e-3, 1e-3)), Wave(1e-3, 2e-7, 3e-5), Wave(1e-3, -2e-7, 3e-5)]
+
+
+def test_points_of_a_sphere_have_the_distance_of_its_radius_from_the_centre():
+    x, y = np.random.default_rng(1).uniform(-0.7, 0.7, (2, 100))
+    np.testing.assert_allclose(np.sqrt(x**2 + y**2 + (Sphere(1.0).heights(x, y) + 1.0) ** 2), 1.0, rtol=1e-14)
+    # Close to the apex, rounding must not destroy the height.
+    assert Sphere(1e-3).heights(1e-12, 0.0) == pytest.approx(-(1e-12**2) / 2e-3, rel=1e-12)
+
+
+def test_points_beside_a_sphere_are_refused():
+    with pytest.raises(ValueError, match=r"radius: 0\.001 m is less than the distance of 0\.00141421 m .* larger"):
+        Sphere(1e-3).heights(np.array([0.0, 1e-3]), np.array([0.0, 1e-3]))
+
+
+def test_paraboloid_has_the_radii_of_curvature_along_its_axes():
+    shape = Paraboloid([2e-3, 5e-3])
+    assert shape.heights(1e-5, 0.0) == pytest.approx(-(1e-5**2) / (2 * 2e-3), rel=1e-14)
+    assert shape.heights(0.0, 1e-5) == pytest.approx(-(1e-5**2) / (2 * 5e-3), rel=1e-14)
+    assert shape.sphere_radius == pytest.approx(math.sqrt(10) * 1e-3, rel=1e-14)
+
+
+def test_punches_exist_inside_their_edges_only():
+    x = np.array([0.0, 0.9, 1.1, 0.8]) * 1e-6
+    y = np.array([0.0, 0.0, 0.0, 0.8]) * 1e-6
+    assert list(CylinderPunch(1e-6).heights(x, y)) == [0, 0, -np.inf, -np.inf]
+    assert list(FlatPunch(2e-6).heights(x, y)) == [0, 0, -np.inf, 0]
+
+
+def test_cone_descends_by_the_cotangent_of_its_half_angle():
+    assert Cone(math.radians(45)).heights(3.0, 4.0) == pytest.approx(-5.0, rel=1e-14)
+    assert Cone(math.radians(80)).heights(0.0, 1.0) == pytest.approx(-math.tan(math.radians(10)), rel=1e-14)
+
+
+def test_waves_repeat_below_the_paraboloid_and_a_trough_lies_in_the_centre_if_the_amplitude_is_negative():
+    crest, trough = Wave(1e-3, 2e-7, 3e-5), Wave(1e-3, -2e-7, 3e-5)
+    paraboloid = Paraboloid((1e-3, 1e-3))
+    assert crest.heights(6e-5, 0.0) == pytest.approx(paraboloid.heights(6e-5, 0.0), rel=1e-12)
+    half = paraboloid.heights(0.0, 1.5e-5)
+    assert crest.heights(0.0, 1.5e-5) == pytest.approx(half - 4e-7, rel=1e-12)
+    assert trough.heights(0.0, 1.5e-5) == pytest.approx(half + 4e-7, rel=1e-12) and half + 4e-7 > 0
+
+
+@pytest.mark.parametrize("shape", [Sphere(1e-3), Cone(1.4), *SMOOTH[2:]])
+def test_slope_is_the_derivative_of_the_height(shape):
+    r, step = np.linspace(1e-5, 3e-4, 7), 1e-9
+    difference = (shape.heights(r - step, 0.0) - shape.heights(r + step, 0.0)) / (2 * step)
+    np.testing.assert_allclose(shape.slope(r), difference, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "message"),
+    [
+        ("sphere", {"radius": 0.0}, "radius: 0.0 must be a number in"),
+        ("paraboloid", {"radii": 1e-3}, "radii: 0.001 must be two lengths in m"),
+        ("flat_punch", {"side": -1e-6}, "side: -1e-06 must be"),
+        ("cone", {"half_angle": math.pi / 2}, "half_angle: 1.57.* must be a number in .* \\(in rad\\)"),
+        ("wave", {"radius": 1e-3, "amplitude": math.nan, "wavelength": 1e-5}, "amplitude: nan is not finite"),
+    ],
+)
+def test_invalid_parameters_are_refused_by_name(name, values, message):
+    with pytest.raises(ValueError, match=message):
+        SHAPES[name](**values)

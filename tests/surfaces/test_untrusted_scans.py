@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scans import COLUMNS, HEIGHTS, NM, ROWS, SIZE, preparation, refused, scan, write_xyz
 
-from icha.datasets.format import SURFACE, UnknownFile, identify_file
+from icha.datasets.format import UnknownFile, identify_file
 from icha.surfaces.measured.scan import read_height_map
 from icha.surfaces.measured.settings import UnfitTopography
 from icha.surfaces.measured.topography import prepared_topography
@@ -75,16 +75,6 @@ def test_declared_sizes_are_bounded_before_anything_is_read(name, tmp_path):
             read_height_map(tmp_path / name, 1.0)
 
 
-@pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("side", [2**32, 2**62])
-def test_sizes_that_no_number_holds_are_refused_without_a_warning(side, tmp_path):
-    with (tmp_path / "scan.npy").open("wb") as file:
-        np.lib.format.write_array_header_1_0(file, {"descr": "<f8", "fortran_order": False, "shape": (side, side)})
-        file.write(bytes(8))
-    with pytest.raises(UnfitTopography, match="cannot be read as npy"):
-        scan(tmp_path / "scan.npy", **LINES)
-
-
 def test_the_limit_can_be_raised_and_must_be_a_number(tmp_path, monkeypatch):
     np.save(tmp_path / "scan.npy", np.random.default_rng(1).normal(size=(300, 300)))
     monkeypatch.setenv("ICHA_INPUT_MB", "1")
@@ -132,22 +122,6 @@ def test_files_that_unpack_to_more_than_they_declare_are_refused(tmp_path):
     *messages, more = done.stdout.splitlines()
     assert len(messages) == 3 and all(line.startswith("UnfitTopography") for line in messages), messages
     assert int(more) < 40_000  # kB
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="only Linux can bound the memory of a process")
-def test_files_that_are_large_themselves_are_read_and_small_ones_that_say_so_are_not(tmp_path, monkeypatch):
-    monkeypatch.setattr("icha.support.input_files._DEFAULT_MB", 16)
-    # A side: 72 MB. Below 32 MiB, memory that earlier tests have freed may be taken again, which no limit counts.
-    nodes = 3000
-    for name, compression in (("own.nc", None), ("packed.nc", "zlib")):
-        with netCDF4.Dataset(tmp_path / name, "w") as file:
-            for axis in "yx":
-                file.createDimension(axis, nodes)
-            file.createVariable("period", "f8")[...] = 1.0
-            file.createVariable("height", "f8", ("y", "x"), compression=compression)[:] = np.zeros((nodes, nodes))
-    assert identify_file(tmp_path / "own.nc")[0] == SURFACE
-    with pytest.raises(UnknownFile, match=r"packed\.nc: "):
-        identify_file(tmp_path / "packed.nc")
 
 
 def test_what_is_left_in_a_campaign_dataset_until_it_is_used_is_bounded_as_well(tmp_path):

@@ -7,7 +7,7 @@ import pytest
 from icha.checks.applicability import asperity_applicability
 from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
 from icha.path.targets import largest_area_fraction
-from validation.applicability import COUNT, WRONG_FACTOR, State, case, largest_factor, press, reference, states
+from validation.applicability import COUNT, WRONG_FACTOR, case, largest_factor, press, reference, states
 
 # Numbers of a random surface, a random surface with Gaussian amplitudes and two waves: U_full/dgamma is 1.5, 2.1, 1.4.
 STICKY = (20, 31, 53)
@@ -51,10 +51,3 @@ def test_the_limit_of_the_area_grows_with_the_energy_of_full_contact():
     assert asperity_applicability(2.0, contact_area_fraction=0.039) == ""
     assert "A/A0 = 0.041, more than 0.04: adhesion" in asperity_applicability(2.0, contact_area_fraction=0.041)
     assert asperity_applicability(math.inf, contact_area_fraction=0.3) == ""
-
-
-def test_only_resolved_patches_are_compared():
-    found, exact = {1e-3: State(0.1, 2.0, 1.0), 1e-2: State(0.2, 1.0, 3.0)}, {1e-3: State(0.3, 2.0, 1.9)}
-    assert math.isnan(largest_factor(found, exact))
-    assert largest_factor(found, exact | {1e-2: State(0.25, 1.1, 2.1)}) == pytest.approx(1.25)
-    assert largest_factor(found, exact | {1e-2: State(0.25, 0.0, 2.1)}) == math.inf

@@ -1,11 +1,16 @@
-"""Closed forms of the limit of short range against Fourier sums, quadrature, energy, and limits."""
+"""Closed forms of the limit of short range against Fourier sums, quadrature, energy, and limits; jumps into contact."""
+
+import re
 
 import numpy as np
 import pytest
+from conftest import REPOSITORY
 from scipy.integrate import quad
+from scipy.special import hyp2f1
 
 from icha import Material
-from icha.asperity.jkr import JKR
+from icha.asperity.jkr import JKR, wu_gap
+from icha.asperity.material import WU_HOLDS_FROM
 from icha.half_space.interaction import displacement_at
 from validation.closed_forms import (
     IMAGES_CUBED,
@@ -16,6 +21,7 @@ from validation.closed_forms import (
     Strips,
     intensity_at_equilibrium,
 )
+from validation.jump_in import displacement_matrix, jump_in_gap, nodes
 
 SOFT = Material(2.0, 0.3, 1e-3)
 BARE = Material(2.0, 0.0, 1e-3)
@@ -59,13 +65,6 @@ def test_strips_have_koiters_stress_intensity():
     assert intensity**2 == pytest.approx(sigma**2 * L / np.tan(np.pi * a / L), rel=1e-6)
     at_pull_off = Strips(SOFT, a, L).pull_off_tension * intensity / sigma
     assert at_pull_off == pytest.approx(intensity_at_equilibrium(SOFT), rel=1e-6)
-
-
-def test_compliance_of_strips_gives_their_energy_release_rate():
-    a, L = 0.3, 1.7
-    tension = Strips(SOFT, a, L).pull_off_tension
-    gained = slope(lambda half: -(tension**2) * L * Strips(SOFT, half, L).compliance / 2, a)
-    assert gained == pytest.approx(2 * SOFT.surface_energy, rel=1e-7)
 
 
 # --- the sinusoid ------------------------------------------------------------------------------------------------
@@ -132,10 +131,27 @@ def test_images_of_the_sphere_bend_the_half_space_under_it():
     np.testing.assert_allclose(drop, np.sum(x[1:] ** 2, axis=1) / (2 * R), rtol=1e-4)
 
 
-def test_sphere_in_a_wide_cell_is_a_single_sphere():
-    cell = SphereInCell(SOFT, 2.0, 1e7)
-    law = JKR(SOFT)
-    assert cell.pull_off_force == pytest.approx(1.5 * np.pi * SOFT.surface_energy * 2.0, rel=1e-6)
-    assert cell.jump_off_radius == pytest.approx(float(law.jump_off_radius(2.0)), rel=1e-5)
-    assert cell.contact_radius(0.3) == pytest.approx(float(law.contact_radius(0.3, 2.0)), rel=1e-5)
-    assert cell.force(cell.loaded_radius(0.1)) == pytest.approx(0.1)
+def test_displacement_by_a_smooth_load_is_exact():
+    # Hankel's transform of (1 + r^2)^-3 is k^2 K_2(k)/8; u is twice the integral of that times J_0(kr).
+    squared = nodes() ** 2
+    exact = 3 * np.pi / 8 * hyp2f1(0.5, 2.5, 1, -squared)
+    np.testing.assert_allclose(displacement_matrix() @ (1 + squared) ** -3, exact, rtol=1e-9, atol=1e-9)
+
+
+def test_wu_holds_from_where_the_models_say():
+    for tabor_parameter in np.geomspace(WU_HOLDS_FROM, 1e6, 13):
+        assert 0 < wu_gap(tabor_parameter) / jump_in_gap(tabor_parameter) - 1 < 0.005
+    # Far from contact only the tail of the attraction counts, and the power is exact.
+    far = [jump_in_gap(tabor_parameter) / tabor_parameter ** (3 / 7) for tabor_parameter in (1e5, 1e6)]
+    assert far[0] == pytest.approx(2.6409, abs=5e-5) and far[1] == pytest.approx(far[0], rel=1e-8)
+
+
+def test_the_docs_give_these_distances():
+    text = (REPOSITORY / "docs/model.md").read_text()
+    rows = re.findall(r"^\| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) % \|$", text, flags=re.MULTILINE)
+    assert len(rows) == 8
+    for tabor_parameter, *written in rows:
+        exact, wu = jump_in_gap(float(tabor_parameter)), wu_gap(float(tabor_parameter))
+        numbers = (exact, wu, 100 * (wu / exact - 1))
+        for number, digits in zip(numbers, written, strict=True):
+            assert number == pytest.approx(float(digits), abs=0.51 * 10.0 ** -len(digits.partition(".")[2]))

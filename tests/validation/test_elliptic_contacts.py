@@ -40,11 +40,6 @@ def test_response_of_a_front_to_a_wave_is_the_weighted_pressure_of_full_contact(
     assert 2 * integral == pytest.approx(math.pi * math.exp(-0.6), rel=1e-8)
 
 
-def test_response_of_a_front_is_that_of_the_public_code_crackfront():
-    # Its tests: E* = 0.75, wavelength 1, amplitude 0.1.
-    assert abs(elliptic.front_response(0.1, 1.0, 0.75, 0.3)) == pytest.approx(0.1329, abs=5e-5)
-
-
 def displacement(x, y, a, b, c_0, c_1, c_2):
     """Integrate p/(pi E* r) over the ellipse along chords through (x, y), for E* = 1."""
     angles = (np.arange(400) + 0.5) * np.pi / 400
@@ -157,24 +152,3 @@ def test_elliptic_jkr_contact_tends_to_the_circle_and_to_hertz(criterion):
     bare = elliptic.elliptic_hertz_contact(loaded.force, radii, MODULUS)
     np.testing.assert_allclose(loaded.semi_axes, bare.semi_axes, rtol=1e-2)
     assert float(loaded.indentation) == pytest.approx(float(bare.indentation), rel=1e-2)
-
-
-@pytest.mark.parametrize("criterion", ["energy", "axes"])
-def test_pull_off_force_of_an_ellipse_decreases_with_the_ratio_of_its_radii(criterion):
-    # Johnson & Greenwood (2005), abstract: it decreases from 3/2 pi w R of spheres, here with R = sqrt(Rx Ry).
-    forces = [
-        float(elliptic.elliptic_pull_off((RADIUS * s, RADIUS / s), MODULUS, WORK, criterion).force)
-        / closed.sphere_pull_off(RADIUS, MODULUS, WORK).force
-        for s in (1.05, 1.2, 1.5, 2.0, 3.0)
-    ]
-    assert forces[0] < 1 and np.all(np.diff(forces) < 0)
-
-
-def test_unknown_criterion_of_an_ellipse_is_refused():
-    with pytest.raises(ValueError, match="criterion: 'area' must be one of energy, axes"):
-        elliptic.elliptic_jkr_contact(0.9, (2.0, 1.0), MODULUS, WORK, "area")
-
-
-def test_radii_too_different_for_an_ellipse_are_refused():
-    with pytest.raises(ValueError, match=r"radii: their ratio 1e\+06 is too large"):
-        elliptic.elliptic_hertz_contact(1e-3, (1e6, 1.0), MODULUS)
