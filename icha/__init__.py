@@ -13,7 +13,8 @@ _HOME = {
     "Path": "path.targets",
     "read_scan": "configuration.topographies",
     "simulate": "simulation",
-    **dict.fromkeys(("plot_area", "plot_contact", "plot_separation"), "figures.quick"),
+    "fit_jkr_test": "references.jkr_test",
+    **dict.fromkeys(("plot_area", "plot_contact", "plot_jkr_test", "plot_separation"), "figures.quick"),
     "ConvergenceError": "simulation",
     "fetch_deposit": "deposit.fetch",
     "IchaWarning": "support.usual",
@@ -28,8 +29,10 @@ if TYPE_CHECKING:  # for editors and type checkers only
     from icha.deposit.fetch import fetch_deposit as fetch_deposit
     from icha.figures.quick import plot_area as plot_area
     from icha.figures.quick import plot_contact as plot_contact
+    from icha.figures.quick import plot_jkr_test as plot_jkr_test
     from icha.figures.quick import plot_separation as plot_separation
     from icha.path.targets import Path as Path
+    from icha.references.jkr_test import fit_jkr_test as fit_jkr_test
     from icha.simulation import ConvergenceError as ConvergenceError
     from icha.simulation import simulate as simulate
     from icha.support.usual import IchaWarning as IchaWarning

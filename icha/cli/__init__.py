@@ -9,6 +9,7 @@ from icha.cli.check import check
 from icha.cli.deposits import reproduce, upload, verify
 from icha.cli.describe import describe
 from icha.cli.explore import explore
+from icha.cli.jkr import jkr
 from icha.cli.new import new
 from icha.cli.project import echo, reports_errors
 from icha.cli.run import run
@@ -48,7 +49,7 @@ def icha(
     """
 
 
-for command in (new, describe, run, answer, show, explore, check, verify, reproduce, upload):
+for command in (new, describe, run, answer, show, explore, check, jkr, verify, reproduce, upload):
     app.command()(reports_errors(command))
 
 

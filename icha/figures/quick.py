@@ -9,11 +9,23 @@ import numpy as np
 from icha.datasets.quantities import quantity
 from icha.figures.curves import Panel
 from icha.figures.maps import draw_spots
+from icha.figures.style import BLUE, GREEN, GREY, VERMILLION, in_style, new_panels
 from icha.support.formatting import choose_unit
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from icha.references.jkr_test import JKRTest
+
+# Look of the points of a JKR test by their use; other points are left out.
+_LOOKS: dict[str, dict[str, object]] = {
+    "loading": {"marker": "o", "color": BLUE},
+    "stuck": {"marker": "D", "color": GREEN},
+    "receding": {"marker": "s", "color": VERMILLION},
+}
+_LEFT_OUT = {"marker": "x", "color": GREY}
 
 
 def plot_area(run: xr.Dataset, axes: Axes | None = None, **look: object) -> Axes:
@@ -57,6 +69,39 @@ def plot_contact(run: xr.Dataset, axes: Axes | None = None, *, snapshot: int = -
         axes.set(xlim=(0, side * factor), ylim=(0, side * factor), aspect="equal")
     axes.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})")
     return axes
+
+
+@in_style
+def plot_jkr_test(test: JKRTest) -> Figure:
+    """Draw points, fit and residuals of a JKR test; return the figure, which `Figure.savefig` writes.
+
+    Parameters
+    ----------
+    test : result of `icha.fit_jkr_test`.
+    """
+    names = [name for name in test.measured if name != "force"]
+    per_newton, force_unit = choose_unit(float(np.abs(test.measured["force"]).max()), "N")
+    force, force_residual = test.measured["force"] * per_newton, test.residuals["force"] * per_newton
+    heights = {"height_ratios": [3, 1, 1]}
+    figure, panels = new_panels(5.4, 3, len(names), width=3.55 * max(len(names), 1.3), sharex="col", **heights)
+    for (top, middle, bottom), name in zip(panels.T, names, strict=True):
+        per_metre, unit = choose_unit(float(np.abs(test.measured[name]).max()), "m")
+        x, residual = test.measured[name] * per_metre, test.residuals[name] * per_metre
+        for use, count in test.counts.items():
+            members = test.used_for == use
+            look = {"ls": "none", "ms": 3, "mfc": "none", "mew": 0.7} | _LOOKS.get(use, _LEFT_OUT)
+            label = f"{use} ({count})" if use in _LOOKS else f"left out: {use} ({count})"
+            for axes, values in ((top, force), (middle, force_residual), (bottom, residual)):
+                axes.plot(x[members], values[members], label=label, **look)
+        for use, states in test.curves().items():
+            top.plot(getattr(states, name) * per_metre, states.force * per_newton, color=_LOOKS[use]["color"], lw=1)
+        top.set_ylabel(f"force  ({force_unit})")
+        middle.set_ylabel(f"residual  ({force_unit})")
+        bottom.set(xlabel=f"{name.replace('_', ' ')}  ({unit})", ylabel=f"residual  ({unit})")
+        for axes in (top, middle, bottom):
+            axes.axhline(0, color=GREY, lw=0.5, zorder=0)
+    panels[0, 0].legend(title="points (their number), lines: fit", title_fontsize=8)
+    return figure
 
 
 def _plot_against_pressure(run, name, axes, look):

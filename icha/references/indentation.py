@@ -106,6 +106,15 @@ def sphere_contact(contact_radius, radius, contact_modulus, work_of_adhesion=0.0
     return _with_adhesion(a, a**2 / radius, 4 / 3 * contact_modulus * a**3 / radius, contact_modulus, work_of_adhesion)
 
 
+def sphere_energy_release_rate(force, contact_radius, radius, contact_modulus):
+    """Return the energy release rate at the edge of a contact of a paraboloid, J/m^2, from `sphere_contact`.
+
+    G = (4 E* a^3/(3 R) - F)^2/(8 pi E* a^3); in equilibrium it is the work of adhesion.
+    """
+    hertz = sphere_contact(contact_radius, radius, contact_modulus).force
+    return (hertz - force) ** 2 / (8 * np.pi * contact_modulus * contact_radius**3)
+
+
 def sphere_radius_at_force(force, radius, contact_modulus, work_of_adhesion=0.0):
     """Return the contact radius that is stable at a force, m (JKR 1971; Hertz with w = 0).
 

@@ -1,8 +1,8 @@
-"""Evaluation of JKR tests: the work of adhesion from measured or computed forces of a sphere, as experiments do it.
+"""Work of adhesion from the computed forces of a sphere on one branch, as experiments find it.
 
-A fit compares the force with the contact radius or with the indentation. On rough surfaces the fitted work of adhesion
-is an apparent one, smaller on loading than on unloading (S. Dalvi et al., Proc. Natl. Acad. Sci. 116 (2019) 25484,
-doi:10.1073/pnas.1913126116).
+A fit compares the force with the contact radius or with the indentation. `icha.references.jkr_test` fits measured
+points of both branches. On rough surfaces the fitted work of adhesion is an apparent one, smaller on loading than on
+unloading (S. Dalvi et al., Proc. Natl. Acad. Sci. 116 (2019) 25484, doi:10.1073/pnas.1913126116).
 """
 
 import math
@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from icha.references.indentation import sphere_contact
-from icha.support.rules import CONTACT_MODULUS, LENGTH, SURFACE_ENERGY
+from icha.support.rules import CONTACT_MODULUS, LENGTH
 
 # First and last root of the work of adhesion at which fits start, in the unit of the largest force, and their number.
 _STARTS = 0.1, 1.2, 24
@@ -34,22 +34,6 @@ class JKRFit(NamedTuple):
     work_of_adhesion: float
     contact_modulus: float
     misfit: float
-
-
-class JKRTest(NamedTuple):
-    """Evaluation of loading and unloading.
-
-    Attributes
-    ----------
-    loading, unloading : fits to the two parts.
-    pull_off_force : largest tension, N, positive.
-    pull_off_work : work of adhesion of the JKR sphere with this pull-off force, F/(3/2 pi R), J/m^2.
-    """
-
-    loading: JKRFit
-    unloading: JKRFit
-    pull_off_force: float
-    pull_off_work: float
 
 
 def fit_work_of_adhesion(
@@ -111,32 +95,6 @@ def fit_work_of_adhesion(
     found = min(fits, key=lambda fit: fit.cost)
     found = hertzian if hertzian.cost <= found.cost * (1 + _ROUNDING) else found
     return JKRFit(*parameters(found.x), float(np.sqrt(np.mean(found.fun**2))))
-
-
-def evaluate_jkr_test(force, radius: float, *, contact_radius=None, indentation=None, contact_modulus=None) -> JKRTest:
-    """Fit loading and unloading of one test separately; the arguments are those of `fit_work_of_adhesion`.
-
-    The states must be in the order of the test. Loading ends with the largest force. Unloading ends with the smallest
-    force after it, because a test under load control ends there. States without contact, of force 0, are left out.
-    """
-    force = _finite_array("force", force)
-    turn = int(np.argmax(force))
-    end = turn + int(np.argmin(force[turn:])) + 1
-
-    def fit(first, last):
-        part = np.flatnonzero(force[first:last]) + first
-        pairs = {"contact_radius": contact_radius, "indentation": indentation}
-        chosen = {name: np.asarray(values)[part] for name, values in pairs.items() if values is not None}
-        return fit_work_of_adhesion(force[part], radius, contact_modulus=contact_modulus, **chosen)
-
-    pull_off_force = max(-float(force[end - 1]), 0.0)
-    return JKRTest(fit(0, turn + 1), fit(turn + 1, end), pull_off_force, pull_off_force / (1.5 * math.pi * radius))
-
-
-def pull_off_ratio(force, radius: float, work_of_adhesion: float) -> float:
-    """Return the largest tension in an array of forces, divided by the pull-off force 3/2 pi w R of a JKR sphere."""
-    work = SURFACE_ENERGY.validate("work_of_adhesion", work_of_adhesion)
-    return max(-float(np.min(force)), 0.0) / (1.5 * math.pi * LENGTH.validate("radius", radius) * work)
 
 
 def _cubed_radius(force, radius, contact_modulus, work_of_adhesion):

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from icha.support.input_files import TooLarge, bounded_memory, problem_with_path
-from icha.support.rules import POSITIVE
+from icha.support.rules import POSITIVE, FloatRange
 
 if TYPE_CHECKING:
     import numpy as np
@@ -97,6 +97,22 @@ def read_rows(path: str | os.PathLike) -> tuple[list[Row], list[str]]:
     return rows, remarks
 
 
+def read_table(path: str | os.PathLike) -> tuple[list[str], list[Row]]:
+    """Read a table with a line of headings; return the headings and the rows below.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read, or if a row does not have as many fields as there are headings.
+    """
+    rows, _ = read_rows(path)
+    if len(rows) < 2:
+        raise ValueError("contains no values; expected a CSV file with a line of headings and lines of numbers")
+    (_, headings), *rows = rows
+    check_lengths(rows, len(headings))
+    return headings, rows
+
+
 def check_lengths(rows: list[Row], expected: int) -> None:
     """Raise ValueError for the first row that does not have the expected number of fields."""
     for number, row in rows:
@@ -156,8 +172,8 @@ def _decimal_sign(fields):
     return "."
 
 
-def positive_numbers(rows: list[Row], columns: Mapping[int, str]) -> list[np.ndarray]:
-    """Return the numbers in some columns; raise ValueError if one is not positive.
+def numbers_of(rows: list[Row], columns: Mapping[int, str], rule: FloatRange = POSITIVE) -> list[np.ndarray]:
+    """Return the numbers in some columns; raise ValueError if one is not within the bounds of `rule`.
 
     The numbers of all these columns have the same decimal sign, a point or a comma.
 
@@ -165,6 +181,7 @@ def positive_numbers(rows: list[Row], columns: Mapping[int, str]) -> list[np.nda
     ----------
     rows : rows of the table.
     columns : name of each column for messages, by its index from 0.
+    rule : bounds of the numbers; positive by default.
     """
     import numpy as np  # imported here because most commands read no table
 
@@ -174,11 +191,10 @@ def positive_numbers(rows: list[Row], columns: Mapping[int, str]) -> list[np.nda
         numbers = []
         for line, row in rows:
             try:
-                numbers.append(POSITIVE.validate("", _number(row[column], decimal)))
+                numbers.append(rule.validate("", _number(row[column], decimal)))
             except ValueError:
-                raise ValueError(
-                    f"column {name}, line {line}: {row[column][:40]!r}; expected a number greater than 0"
-                ) from None
+                text = f"column {name}, line {line}: {row[column][:40]!r}; expected {rule.expected}"
+                raise ValueError(text) from None
         found.append(np.array(numbers))
     return found
 
@@ -199,16 +215,12 @@ def read_columns(
     ValueError
         If the file cannot be read, a column is missing, or a value is not a positive number or exceeds its limit.
     """
-    rows, _ = read_rows(path)
-    if len(rows) < 2:
-        raise ValueError("contains no values; expected a CSV file with a line of headings and lines of numbers")
-    (_, headings), *rows = rows
-    check_lengths(rows, len(headings))
+    headings, rows = read_table(path)
     for heading in columns:
         if headings.count(heading) != 1:
             reason = f"has {headings.count(heading) or 'no'} column{'s' * (heading in headings)} {heading!r}"
             raise ValueError(f"{reason}; expected one of {', '.join(headings)}")
-    found = positive_numbers(rows, {headings.index(heading): repr(heading) for heading in columns})
+    found = numbers_of(rows, {headings.index(heading): repr(heading) for heading in columns})
     found = [values * factor for values, factor in zip(found, columns.values(), strict=True)]
     for heading, values in zip(columns, found, strict=True):
         most, text = (limits or {}).get(heading, (math.inf, ""))

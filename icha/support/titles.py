@@ -3,6 +3,7 @@
 import math
 import re
 import unicodedata
+from typing import NamedTuple
 
 from icha.support.units import conversion_factor
 
@@ -57,16 +58,39 @@ def power_of_length(text: str) -> tuple[float, int] | None:
     return (factor, total) if total else None
 
 
-def contradicting_unit(title: str, unit: str, si_unit: str) -> str | None:
-    """Return the unit that a title states if it is not `unit`, a unit of pressure (Pa) or ratio (1); else None."""
+class StatedUnit(NamedTuple):
+    """Unit that a title states.
+
+    Attributes
+    ----------
+    text : unit as in the title.
+    si_unit : Pa, 1, N or m; m^2 and so on for other powers of length.
+    factor : factor from the unit to `si_unit`.
+    multiple : True if a number stands in front of the unit, as in `10^3 Pa`.
+    """
+
+    text: str
+    si_unit: str
+    factor: float
+    multiple: bool
+
+
+def stated_unit(title: str) -> StatedUnit | None:
+    """Return the unit that a title states; None if there is none."""
     for text, before, certain in _possible_units(title):
         # Outside brackets, words such as `count` are names, and `p_m` is not in metres; `radius um` is in micrometres.
         found = _meaning(text)
-        if found is None or (not certain and (found == ("1", 1.0) or (found == ("m", 1) and text not in _LENGTHS))):
-            continue
-        agrees = found[0] == si_unit and math.isclose(found[1], conversion_factor(unit, si_unit))
-        return None if agrees and not _MULTIPLE.search(before) else text
+        if found and (certain or not (found == ("1", 1.0) or (found[0] == "m" and text not in _LENGTHS))):
+            return StatedUnit(text, *found, bool(_MULTIPLE.search(before)))
     return None
+
+
+def contradicting_unit(title: str, unit: str, si_unit: str) -> str | None:
+    """Return the unit that a title states if it is not `unit`, whose SI unit is Pa, 1, N or m; else None."""
+    if (stated := stated_unit(title)) is None:
+        return None
+    agrees = stated.si_unit == si_unit and math.isclose(stated.factor, conversion_factor(unit, si_unit))
+    return None if agrees and not stated.multiple else stated.text
 
 
 def problem_with_numbers(title: str, unit: str, si_unit: str) -> str | None:
@@ -76,7 +100,7 @@ def problem_with_numbers(title: str, unit: str, si_unit: str) -> str | None:
     ----------
     title : title of the column, without a unit that contradicts `unit`.
     unit : unit of the numbers according to the configuration.
-    si_unit : Pa for pressures, 1 for ratios.
+    si_unit : Pa for pressures, 1 for ratios, N for forces, m for lengths.
     """
     if found := _LOGARITHM.search(unicodedata.normalize("NFKC", title)):
         return f"contains {found[0]!r}, so the numbers look like logarithms; expected the values themselves"
@@ -106,7 +130,7 @@ def _possible_units(title):
 
 
 def _meaning(text):
-    """Return the SI unit (Pa, 1 or N) and the factor of a unit; m and the exponent for powers of length; else None."""
+    """Return the SI unit (Pa, 1, N, m or a power of m) and the factor of a unit; None for other texts."""
     plain = re.sub(r"(?<=[a-z])(?=\d)", "^", text)
     for name in (plain, _SPELLINGS.get(plain.lower())):
         for si_unit in ("Pa", "1", "N") if name else ():
@@ -115,4 +139,4 @@ def _meaning(text):
             except ValueError:
                 continue
     power = power_of_length(text)
-    return power and ("m", power[1])
+    return power and ("m" if power[1] == 1 else f"m^{power[1]}", power[0])

@@ -16,7 +16,7 @@ from scipy.optimize import isotonic_regression
 
 from icha.support.atomic_files import whole_file
 from icha.support.rules import LENGTH
-from icha.support.tables import check_lengths, is_number, positive_numbers, read_rows
+from icha.support.tables import check_lengths, is_number, numbers_of, read_rows
 from icha.support.titles import bracketed_texts, power_of_length, problem_with_numbers
 from icha.support.units import conversion_factor
 from icha.surfaces.moments import radial_power_spectrum
@@ -221,7 +221,7 @@ def read_spectrum_table(
                     f"is {f'{unit:g} m' if length_unit else 'missing'}, but the heading states {line[:60]!r}; expected "
                     f"{name}, with q in rad/{name}, or titles with units, such as q (rad/um), C (um^4)",
                 )
-    q, power = positive_numbers(rows, {0: "1", 1: "2"})
+    q, power = numbers_of(rows, {0: "1", 1: "2"})
     q, power = q * per_length * chosen.wave_factor, power * power_unit * chosen.power_factor
     if not (np.diff(q) > 0).all():
         raise ValueError("has wave numbers that do not increase from row to row; expected each once, sorted")

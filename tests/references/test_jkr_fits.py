@@ -1,4 +1,4 @@
-"""Evaluation of JKR tests: exact curves return their parameters; misfits, orders and refused arguments."""
+"""Fits of one branch: exact curves return their parameters; misfits and refused arguments."""
 
 import math
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from icha.references import indentation as closed
-from icha.references.jkr_fits import evaluate_jkr_test, fit_work_of_adhesion, pull_off_ratio
+from icha.references.jkr_fits import fit_work_of_adhesion
 
 MODULUS, RADIUS = 1e6, 1e-3
 
@@ -76,22 +76,6 @@ def test_fit_is_the_lowest_of_several_minima():
         math.sqrt(np.mean((cubed_radius(work) - data) ** 2)) / data.max() for work in np.linspace(0.005, 0.1, 3000)
     ]
     assert fit.misfit <= min(misfits) * (1 + 1e-6)
-
-
-@pytest.mark.parametrize("quantity", ["contact_radius", "indentation"])
-def test_loading_and_unloading_are_fitted_separately(quantity):
-    loading, unloading = stable_states(0.03, smallest=1.7, largest=9.0), stable_states(0.08)
-    # The last states of unloading lie beyond the pull-off force, and the surfaces are apart at both ends.
-    beyond = stable_states(0.08, smallest=0.7, largest=0.95)
-    force = np.concatenate([[0.0], loading.force, unloading.force[::-1], beyond.force[::-1], [0.0]])
-    first, second, third = (getattr(states, quantity) for states in (loading, unloading, beyond))
-    values = np.concatenate([[0.0], first, second[::-1], third[::-1], [0.0]])
-    assert loading.force.max() > unloading.force.max()
-    test = evaluate_jkr_test(force, RADIUS, contact_modulus=MODULUS, **{quantity: values})
-    assert test.unloading.work_of_adhesion == pytest.approx(0.08, rel=1e-5)
-    assert test.loading.work_of_adhesion == pytest.approx(0.03, rel=1e-5)
-    assert test.pull_off_work == pytest.approx(0.08, rel=1e-9)
-    assert pull_off_ratio(force, RADIUS, 0.05) == pytest.approx(1.6, rel=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,234 @@
+"""JKR tests from tables: exact curves, coverage of intervals, columns, points left out, refusals, warnings."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import icha
+from icha.cli import app
+from validation.jkr_test import exact_test, noisy_test
+
+TRUTH = {"contact_modulus": 1.8e6, "advancing_work": 0.03, "receding_work": 0.09}
+RADIUS, COLUMNS = 5e-3, ["contact_radius", "indentation"]
+# The table of the tests that need no noise, with little scatter.
+EXACT = exact_test(points=40)
+
+
+def values(test):
+    return [getattr(test, name).value for name in TRUTH]
+
+
+def as_csv(table, folder, headings="force (mN),contact radius (um)", factors=(1e3, 1e6), delimiter=","):
+    rows = np.column_stack(list(table.values())) * factors
+    path = folder / "test.csv"
+    np.savetxt(path, rows, "%.9g", delimiter, header=headings.replace(",", delimiter), comments="", encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("columns", [COLUMNS[:1], COLUMNS[1:], COLUMNS])
+@pytest.mark.parametrize("receding", [0.09, 0.03])
+def test_exact_points_return_their_parameters(columns, receding):
+    table = {name: each for name, each in exact_test(receding=receding).items() if name in ("force", *columns)}
+    if "indentation" in columns:
+        table["indentation"] = table["indentation"] + 3e-6
+    test = icha.fit_jkr_test(table, RADIUS)
+    np.testing.assert_allclose(values(test), [1.8e6, 0.03, receding], rtol=1e-3)
+    assert test.warnings == () and set(test.counts) <= {"loading", "stuck", "receding"}
+    assert np.abs(test.residuals["force"]).max() < 1e-5 * table["force"].max()
+    if "indentation" in columns:
+        assert test.indentation_offset.value == pytest.approx(3e-6, abs=1e-9)
+        known = icha.fit_jkr_test(table, RADIUS, indentation_offset=3e-6)
+        assert known.indentation_offset is None
+        np.testing.assert_allclose(values(known), values(test), rtol=1e-3)
+        assert np.abs(known.residuals["indentation"]).max() < 1e-9
+
+
+def test_stuck_points_lie_on_the_line_of_a_punch():
+    test = icha.fit_jkr_test(EXACT, RADIUS)
+    stuck = test.used_for == "stuck"
+    assert stuck.sum() > 5
+    np.testing.assert_allclose(test.fitted["contact_radius"][stuck], EXACT["contact_radius"].max(), rtol=1e-4)
+    slope = np.polyfit(test.fitted["indentation"][stuck], test.fitted["force"][stuck], 1)[0]
+    assert slope == pytest.approx(2 * 1.8e6 * EXACT["contact_radius"].max(), rel=1e-4)
+
+
+def test_intervals_contain_the_truth_in_eight_to_ten_of_ten_tests():
+    rng, inside = np.random.default_rng(1), dict.fromkeys(TRUTH, 0)
+    for number in range(10):
+        columns, offset = COLUMNS[number % 2 :][:1], 1e-6 * (number % 2)
+        test = icha.fit_jkr_test(noisy_test(EXACT, rng, columns, offset), RADIUS, seed=number)
+        for name, value in TRUTH.items():
+            interval = getattr(test, name)
+            assert interval.low < interval.value < interval.high
+            inside[name] += interval.low <= value <= interval.high
+    assert all(8 <= count <= 10 for count in inside.values()), inside
+
+
+def test_the_seed_determines_the_intervals():
+    table = noisy_test(EXACT, np.random.default_rng(1), COLUMNS[:1])
+    first, again, other = (icha.fit_jkr_test(table, RADIUS, seed=seed).advancing_work for seed in (1, 1, 2))
+    assert first == again and first.value == other.value and first != other
+
+
+@pytest.mark.parametrize(
+    ("headings", "factors", "delimiter", "options"),
+    [
+        ("force (mN),contact radius (um)", (1e3, 1e6), ",", {}),
+        ("Load [µN],a / mm", (1e6, 1e3), ";", {}),
+        ("F_N,radius um", (1, 1e6), "\t", {}),
+        ("force,a", (1e3, 1e6), ",", {"units": {"force": "mN", "contact_radius": "um"}}),
+        (
+            "cell (gf),optical (nm)",
+            (1e3 / 9.80665, 1e9),
+            ",",
+            {"columns": {"force": "cell (gf)", "contact_radius": "optical (nm)"}},
+        ),
+    ],
+)
+def test_units_of_headings_and_options(headings, factors, delimiter, options, tmp_path):
+    table = {name: EXACT[name] for name in ("force", "contact_radius")}
+    test = icha.fit_jkr_test(as_csv(table, tmp_path, headings, factors, delimiter), RADIUS, **options)
+    np.testing.assert_allclose(values(test), list(TRUTH.values()), rtol=1e-3)
+
+
+def test_a_column_of_the_branch_replaces_the_order():
+    order = np.random.default_rng(2).permutation(40)
+    table = {name: EXACT[name][order] for name in ("force", "contact_radius")}
+    table["branch"] = np.where(order < 20, "loading", "Retraction")
+    np.testing.assert_allclose(values(icha.fit_jkr_test(table, RADIUS)), list(TRUTH.values()), rtol=1e-3)
+
+
+def test_points_without_contact_are_left_out_and_counted():
+    """An instrument records noise around zero before the jump-in and after pull-off."""
+    rng = np.random.default_rng(3)
+    before, after = np.linspace(-20e-6, -1e-6, 15), np.linspace(-4e-6, -20e-6, 12)
+    states = exact_test(points=60)
+    # The jump-in under displacement control leads to tension, which a test under load control has not.
+    jumped = {"force": [-4 / 3 * math.pi * 0.03 * RADIUS], "indentation": [0.0]}
+    force = np.concatenate([np.zeros(15), jumped["force"], states["force"], np.zeros(12)])
+    depth = np.concatenate([before, jumped["indentation"], states["indentation"], after])
+    test = icha.fit_jkr_test({"force": force + 1e-5 * rng.standard_normal(len(force)), "indentation": depth}, RADIUS)
+    assert test.counts["before contact"] == 15 and test.counts["after pull-off"] == 12
+    np.testing.assert_allclose(values(test), list(TRUTH.values()), rtol=0.05)
+    assert np.isnan(test.fitted["force"][:15]).all()
+    contact = np.concatenate([np.zeros(16), states["contact_radius"], np.zeros(12)])
+    assert icha.fit_jkr_test({"force": force, "contact_radius": contact}, RADIUS).counts["without contact"] == 28
+
+
+def test_without_unloading_there_is_only_the_advancing_work():
+    table = {name: EXACT[name][:20] for name in ("force", "contact_radius")}
+    with pytest.warns(icha.IchaWarning, match="no points of unloading"):
+        test = icha.fit_jkr_test(table, RADIUS)
+    assert test.receding_work is None and "receding" not in str(test).split("warning")[0]
+    assert test.advancing_work.value == pytest.approx(0.03, rel=1e-3) and set(test.curves()) == {"loading"}
+
+
+def test_a_stuck_contact_gives_a_lower_bound_of_the_receding_work():
+    states = exact_test(points=60)
+    table = {name: states[name][:42] for name in ("force", "contact_radius")}
+    with pytest.warns(icha.IchaWarning, match=r"stuck at nearly all points .* at least about") as caught:
+        test = icha.fit_jkr_test(table, RADIUS)
+    bound = float(str(caught[0].message).split("about ")[1].split()[0]) / 1e3
+    assert test.receding_work is None and test.counts["stuck"] > 10 and 0.04 < bound < 0.09
+
+
+@pytest.mark.parametrize(
+    ("options", "changes", "message"),
+    [
+        (
+            {},
+            {"radius": 2e-4, "load": 1e-3},
+            r"times the radius of the lens: JKR is for a paraboloid, .* \d\.\d % larger",
+        ),
+        ({"thickness": 1e-3}, {}, "times the thickness: on a bonded, incompressible layer, the force at an ind.* 43 %"),
+        ({"interaction_range": 1e-5}, {}, "at the Tabor parameter"),
+        ({"roughness": "rough"}, {}, r"U_full/Δγ = .* apparent"),
+        ({}, {"receding": 0.02}, "less than the advancing one"),
+        ({}, {"modulus": 1e13, "load": 1e3}, "contact_modulus: .* is unusual"),
+    ],
+)
+def test_limits_of_the_law_are_warnings(options, changes, message):
+    if "roughness" in options:
+        spectrum = icha.SelfAffineSpectrum(1e-4, 5e-5, 1.6e-5, 0.8, 0.1)
+        options = {"roughness": spectrum.realise(64, 1)}
+    states = exact_test(**changes)
+    table = {name: states[name] for name in ("force", "contact_radius")}
+    if "receding" in changes:  # contact without a stuck part, larger on loading
+        table["contact_radius"][-25:] *= 0.97
+    with pytest.warns(icha.IchaWarning, match=message):
+        icha.fit_jkr_test(table, changes.get("radius", RADIUS), **options)
+
+
+def test_points_of_another_law_have_correlated_residuals():
+    table = {"force": EXACT["force"], "contact_radius": EXACT["contact_radius"] ** 2 / EXACT["contact_radius"].max()}
+    with pytest.warns(icha.IchaWarning, match="residuals of neighbouring points are correlated"):
+        icha.fit_jkr_test(table, RADIUS)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("force (mN),a (um)\n1,100\n2,nan\n", "column 'a (um)', line 3: 'nan'; expected a number"),
+        ("force (mN),a (um)\n1,100\n2,\n", "column 'a (um)', line 3: ''; expected a number"),
+        ("force (mN),a (um)\n1,100\n2,-1\n", "column 'a (um)', line 3: -1e-06 m; expected a number in [0, 1e9] m"),
+        ("force (mN),a (um)\n1,100\n2,120\n3,9000\n4,150\n", "line 4: 0.009 m is not less than the radius of the lens"),
+        ("force,a (um)\n1,2\n", "column 'force': the unit is missing; expected a unit of force"),
+        ("force (um),a (um)\n1,2\n", "'um' is not a unit of force; expected a unit such as mN"),
+        (
+            "force (mN),area (um^2)\n1,2\n",
+            "has no column for contact radius or indentation among force (mN), area (um^2)",
+        ),
+        ("a (um),t\n2,1\n", "has no column for force"),
+        ("force (mN),load (N),a (um)\n1,2,3\n", "has several columns for force: force (mN), load (N); choose one"),
+        ("force (mN) x 10,a (um)\n1,2\n", "contains a factor"),
+        ("force (mN),a (um)\n-1,10\n-2,20\n-3,30\n-2,25\n", "no force is positive; expected forces that are positive"),
+        ("force (mN),a (um)\n0,10\n-2,20\n-3,30\n1,5\n", "the contact is larger at line 4 than at line 5, the largest"),
+        ("force (mN),a (um)\n1,10\n2,20\n", "has 2 points of loading with contact; expected at least 3"),
+        ("force (mN),a (um)\n3,100\n2,90\n1,80\n0,70\n", "has 1 point of loading with contact"),
+        ("force (mN),a (um)\n1,10\n2,10\n3,10\n4,10\n", "contact_radius: all values are the same"),
+        ("force (mN),a (um),branch\n1,10,loading\n2,20,hold\n", "column 'branch', line 3: 'hold'; expected loading or"),
+    ],
+)
+def test_tables_that_are_no_jkr_test_are_refused(text, message, tmp_path):
+    path = tmp_path / "test.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ValueError, match=r"test\.csv: ") as error:
+        icha.fit_jkr_test(path, RADIUS)
+    assert message in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("table", "options", "message"),
+    [
+        (EXACT, {"radius": -1.0}, "radius: -1.0 must be"),
+        (EXACT, {"units": {"strength": "N"}}, "units: 'strength' is not a quantity"),
+        (EXACT, {"columns": {"force": "load"}}, "has no column 'load'; expected one of force, contact_radius"),
+        (EXACT, {"errors": {"force": 1e-5}}, "errors: no value for contact_radius"),
+        (EXACT | {"force": ["1"] * 40}, {}, "column 'force': expected a list of 40 numbers"),
+        ([1.0], {}, "list is not a table"),
+    ],
+)
+def test_invalid_arguments_are_refused(table, options, message):
+    with pytest.raises(ValueError, match=message.replace("(", r"\(")):
+        icha.fit_jkr_test(table, **{"radius": RADIUS} | options)
+
+
+def test_the_command_prints_intervals_and_draws_the_figure(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    table = noisy_test(EXACT, np.random.default_rng(1), COLUMNS[:1])
+    as_csv(table, tmp_path)
+    done = CliRunner().invoke(app, ["jkr", "test.csv", "--radius", "5 mm", "--thickness", "10 mm"])
+    assert done.exit_code == 0, done.output
+    for words in ("contact modulus E*", "adhesion, receding", "90 % interval", "points: ", "figure: test_jkr.png"):
+        assert words in done.output
+    assert Path("test_jkr.png").stat().st_size > 10_000 and Path("test_jkr.pdf").exists()
+    figure = icha.plot_jkr_test(icha.fit_jkr_test(EXACT, RADIUS))
+    assert len(figure.axes) == 6
+    drawn = sum(len(line.get_xdata()) for line in figure.axes[0].lines if line.get_marker() in "oDs")
+    assert drawn == len(EXACT["force"])
+    for options in (["--radius", "5"], ["--radius", "5 mm", "--unit", "mN"], ["--radius", "5 mm", "--offset", "x"]):
+        refused = CliRunner().invoke(app, ["jkr", "test.csv", *options])
+        assert refused.exit_code == 2 and "expected" in refused.output

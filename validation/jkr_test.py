@@ -1,0 +1,137 @@
+"""How often the intervals of `icha.fit_jkr_test` contain the truth: table of docs/howto/jkr_test.md.
+
+    python -m validation.jkr_test [--tests N] [--tables]
+
+Each synthetic test has its own lens, modulus, works of adhesion, load and noise. Its equations are written here, apart
+from those of the fit: the force at each contact radius follows from the energy release rate, and states at given forces
+are found by interpolation. With `--tables`, nothing is computed; the table is written from the saved counts.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+import icha
+from validation.tables import Table, write_tables
+
+RESULTS = Path(__file__).resolve().parent / "results/jkr_test.json"
+TESTS, POINTS, NOISE = 200, 50, 0.02
+# Measured columns, whether the offset of the indentation is known, and whether the noise is a share of each value
+# instead of a share of the largest value.
+CASES = {
+    "contact radius": (["contact_radius"], True, False),
+    "contact radius, noise a share of each value": (["contact_radius"], True, True),
+    "indentation": (["indentation"], True, False),
+    "indentation, unknown zero": (["indentation"], False, False),
+    "both, unknown zero": (["contact_radius", "indentation"], False, False),
+}
+QUANTITIES = {"contact_modulus": "*E\\**", "advancing_work": "advancing Δγ", "receding_work": "receding Δγ"}
+
+
+def exact_test(
+    *, radius=5e-3, modulus=1.8e6, advancing=0.03, receding=0.09, load=5e-3, points=POINTS, last=0.97
+) -> dict[str, np.ndarray]:
+    """Return force, contact radius and indentation of a test under load control, up to a share of the pull-off force.
+
+    The energy release rate of a contact of radius a is G = (F_1 - F)^2/(8 pi E* a^3), with Hertz's force F_1. Compared
+    with Hertz's contact, the whole contact is lifted by (F_1 - F)/(2 E* a).
+    """
+    a = np.geomspace(1e-4 * radius, radius, 400_001)
+    hertz = 4 * modulus * a**3 / (3 * radius)
+
+    def radii(force, work):
+        stable = hertz - np.sqrt(8 * np.pi * modulus * work * a**3)
+        first = int(np.argmin(stable))
+        return np.interp(force, stable[first:], a[first:])
+
+    pull_off = float((hertz - np.sqrt(8 * np.pi * modulus * receding * a**3)).min())
+    half = points // 2
+    force = np.concatenate([np.linspace(0, load, half), np.linspace(load, last * pull_off, points - half + 1)[1:]])
+    largest = float(radii(load, advancing))
+    retreat = np.minimum(radii(force[half:], receding), largest)
+    contact = np.concatenate([radii(force[:half], advancing), retreat])
+    lift = (4 * modulus * contact**3 / (3 * radius) - force) / (2 * modulus * contact)
+    return {"force": force, "contact_radius": contact, "indentation": contact**2 / radius - lift}
+
+
+def noisy_test(exact: Mapping[str, np.ndarray], rng, columns, offset=0.0, *, by_value=False) -> dict[str, np.ndarray]:
+    """Return the force and other columns of a test with normal noise; indentations are moved by an offset, m."""
+    found = {}
+    for name in ("force", *columns):
+        values = exact[name]
+        size = np.abs(values) if by_value else np.abs(values).max()
+        found[name] = values + NOISE * size * rng.standard_normal(len(values)) + offset * (name == "indentation")
+    return found
+
+
+def random_truth(rng) -> dict[str, float]:
+    """Return the parameters of a random test; its load is 1 to 10 times the pull-off force."""
+    radius, modulus = 10 ** rng.uniform(-3, -2), 10 ** rng.uniform(5.5, 6.5)
+    advancing = rng.uniform(0.02, 0.06)
+    receding = advancing * rng.uniform(1.2, 4)
+    load = rng.uniform(1, 10) * 1.5 * np.pi * receding * radius
+    return {"radius": radius, "modulus": modulus, "advancing": advancing, "receding": receding, "load": load}
+
+
+def measure(tests: int) -> list[dict]:
+    """Return, for each case, how often each interval contains the truth, and the median width of the intervals."""
+    rows = []
+    for case, (columns, known, by_value) in CASES.items():
+        inside, widths = {name: [] for name in QUANTITIES}, {name: [] for name in QUANTITIES}
+        rng = np.random.default_rng(1)
+        for number in range(tests):
+            truth = random_truth(rng)
+            exact = exact_test(**truth)
+            offset = 0.0 if known else 0.3 * float(exact["indentation"].max())
+            table = noisy_test(exact, rng, columns, offset, by_value=by_value)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", icha.IchaWarning)
+                test = icha.fit_jkr_test(table, truth["radius"], indentation_offset=0.0 if known else None, seed=number)
+            true = {"contact_modulus": truth["modulus"]}
+            true |= {"advancing_work": truth["advancing"], "receding_work": truth["receding"]}
+            for name, value in true.items():
+                if (found := getattr(test, name)) is not None:
+                    inside[name].append(found.low <= value <= found.high)
+                    widths[name].append((found.high - found.low) / value)
+        counts = {name: [int(np.sum(each)), len(each)] for name, each in inside.items()}
+        rows.append(
+            {"case": case, "counts": counts, "width": {n: float(np.median(each)) for n, each in widths.items()}}
+        )
+        print(rows[-1], flush=True)
+    return rows
+
+
+def tables(rows: list[dict]) -> dict[str, Table]:
+    """Return the table of the page."""
+    head = ["measured beside the force", *QUANTITIES.values(), *(f"width, {each}" for each in QUANTITIES.values())]
+    lines = []
+    for row in rows:
+        shares = [f"{100 * inside / count:.0f} % of {count}" for inside, count in row["counts"].values()]
+        lines.append([row["case"], *shares, *(f"{100 * width:.0f} %" for width in row["width"].values())])
+    return {"jkr_test_coverage": Table(head, lines, numbers=True)}
+
+
+def read_measurements() -> list[dict]:
+    """Return the saved counts."""
+    return json.loads(RESULTS.read_text(encoding="utf-8"))
+
+
+def main() -> None:
+    """Measure, save and write the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--tests", type=int, default=TESTS, help="number of synthetic tests in each case")
+    parser.add_argument("--tables", action="store_true", help="write the table from the saved counts")
+    options = parser.parse_args()
+    if not options.tables:
+        RESULTS.write_text(json.dumps(measure(options.tests), indent=1) + "\n", encoding="utf-8")
+    write_tables(tables(read_measurements()))
+
+
+if __name__ == "__main__":
+    main()
