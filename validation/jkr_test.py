@@ -1,4 +1,4 @@
-"""How often the intervals of `icha.fit_jkr_test` contain the truth: table of docs/howto/jkr_test.md.
+"""How often the intervals of `icha.fit_jkr_test` contain the truth: table of docs/estimates.md.
 
     python -m validation.jkr_test [--tests N] [--tables]
 

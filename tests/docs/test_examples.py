@@ -18,6 +18,7 @@ NUMBERS = {
     "finite_range": ("pull_off", 1.824, 0.01),  # Maugis at a Tabor number of 0.3
     "own_heights": ("ratio", 1, 0.02),  # Westergaard, with an area counted in cells
     "scan": ("ratio", 1, 1e-6),
+    "jkr_test": ("ratio", 1, 0.05),  # JKR, with noise
     "loop": ("ratio", 1, 1e-3),
     "area_and_separation": ("ratio", 2.05, 0.25),  # between Persson and Bush, Gibson & Thomas
     "interval": ("mean", 0.0463, 0.1),  # boundary elements on the same surfaces
