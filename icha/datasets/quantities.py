@@ -94,6 +94,7 @@ _QUANTITIES = {
     # errors of the asperity model
     "area_error": Quantity("error of contact area", r"A/A_{\mathrm{BEM}}-1", scale="percent"),
     "separation_error": Quantity("error of separation", r"\bar{u}/\bar{u}_{\mathrm{BEM}}-1", scale="percent"),
+    "gap_error": Quantity("error of mean gap", r"\langle u\rangle/\langle u\rangle_{\mathrm{BEM}}-1", scale="percent"),
     "pressure_distribution_distance": Quantity("distance of $P(p)$", "W_1/p"),
     "gap_distribution_distance": Quantity("distance of $P(u)$", f"W_1/{_RMS}"),
     "jaccard": Quantity("overlap of the contact maps"),

@@ -115,7 +115,7 @@ def area_and_gap(
             right.set_yticks([tick for tick in _SEPARATIONS if low < tick < high])
     if compared:
         say(fig, _COMPARED)
-        _draw_differences(axes[1], shown, compared)
+        _draw_differences(axes[1], shown, compared, panels[1].y)
         for ax in axes[0]:
             ax.set_xlabel("")
     say(fig, "" if physical else theories_of_flat_surfaces(dataset))
@@ -225,8 +225,11 @@ def _draw_separate_summits(axes, panels, references, study, dataset, looks):
         axes[0].plot([], [], label=name.curve, **look | ({} if len(theories) <= 2 else {"color": GREY}))
 
 
-def _draw_differences(axes, shown, compared):
-    """Draw the differences between asperities and boundary elements, and those of Ciavarella's estimate."""
+def _draw_differences(axes, shown, compared, gap):
+    """Draw the differences between asperities and boundary elements, and those of Ciavarella's estimate.
+
+    gap : name of the mean gap or mean separation.
+    """
     for ax, (panel, error) in zip(axes, _COMPARED_IN, strict=True):
         for line, truth in compared:
             load, members = _difference(line, truth, panel)
@@ -236,6 +239,7 @@ def _draw_differences(axes, shown, compared):
                 draw_members(ax, load, members, line.look | {"lw": 0.6}, positive=False, **of_curve)
         logarithmic_axes(ax, "x")
         ax.axhline(0, color="0.6", lw=0.6, zorder=0)
+        error = "gap_error" if panel.y == "reduced_separation" and gap == "reduced_gap" else error
         ax.set_ylabel(rf"${quantity(error).symbol}$  (%)")
     _draw_estimates(axes, shown, compared)
 

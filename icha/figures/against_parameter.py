@@ -378,7 +378,8 @@ def loss(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
         path divided by the nominal area (a). The loss is the energy per nominal area that is dissipated on a path from
         first contact to the largest load and back to complete separation.""",
         "Crosses are boundary elements, other symbols the asperity model." if truths else only_model(models),
-        "With boundary elements, the loss is known to 0.1 % of the largest work done in loading."
+        """With boundary elements, steps add an error of at most 0.1 % of the largest work done in loading; the error of
+        the grid is larger."""
         if models != [ASPERITIES_NAME]
         else "",
         range_of_attraction(attractions_of(run for group in every for run in group.by_seed.values())),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,7 +23,7 @@ from icha.figures.looks import (
     legend_below,
     model_handle,
 )
-from icha.figures.select import has_shape, select_snapshots, snapshot_label
+from icha.figures.select import has_layer, has_shape, select_snapshots, snapshot_label
 from icha.figures.style import BLACK, GREY, TWO_COLUMNS, in_style, logarithmic_axes, new_panels, slope_label
 from icha.support.formatting import choose_unit
 from icha.support.statistics import ENOUGH
@@ -90,13 +91,13 @@ _LEAST_CELLS = 100
 _LEAST_NODES = 25
 # Approximate number of markers on a line of boundary elements.
 _BESIDE_MARKERS = 14
+# Reduced pressures count as equal up to this relative difference.
+_SAME_LOAD = 0.01
 
 
 @in_style
 def distributions(campaign: xr.DataTree, *, study: str, kind: str | None = None, target: float | None = None) -> Figure:
     """Draw distributions (means over the seeds) for every material on the first surface and slope of a study."""
-    from icha.analysis.model_error import state_of
-
     lines = select_snapshots(campaign, study, kind, target)
     looks, each_look = _begin(campaign, study, lines)
     fig, [(left, right)] = new_panels(3.1)
@@ -140,8 +141,7 @@ def distributions(campaign: xr.DataTree, *, study: str, kind: str | None = None,
     left.set_ylim(floor / 2)
     for line, look in zip(lines, each_look, strict=True):
         _draw_singular_tail(right, line, 1.05 * lowest, look["color"])
-    load = np.mean([float(state_of(run, at)["reduced_pressure"]) for run, at in lines[-1].members])
-    _draw_persson(right, highest, 0.0 if has_shape(lines[-1].members[0][0]) else load)
+    _draw_persson(right, highest, lines, each_look)
     right.set_xlim(1.05 * np.array((lowest, highest)))
     if top > 0:
         right.set_ylim(top * 5e-5, top * 3)
@@ -154,14 +154,30 @@ def distributions(campaign: xr.DataTree, *, study: str, kind: str | None = None,
     return fig
 
 
-def _draw_persson(ax, highest, load):
-    """Draw Persson's theory at a reduced pressure `load` > 0, up to the pressure `highest`."""
+def _draw_persson(ax, highest, lines, each_look):
+    """Draw Persson's theory up to the pressure `highest`, once for each load of the runs on a flat half-space."""
+    from icha.analysis.model_error import state_of
     from icha.references.persson import persson_pressure_density
 
-    if load > 0:
-        p = np.linspace(0.002, highest, 300)
-        say(ax, "The black line is Persson's theory of contact without adhesion.")
-        plot(ax, p, persson_pressure_density(p, load), color=BLACK, lw=0.9, label="Persson", zorder=2)
+    drawn, p = [], np.linspace(0.002, highest, 300)
+    flat = [not (has_shape(line.members[0][0]) or has_layer(line.members[0][0])) for line in lines]
+    for line, look, _ in filter(itemgetter(2), zip(lines, each_look, flat, strict=True)):
+        load = float(np.mean([state_of(run, at)["reduced_pressure"] for run, at in line.members]))
+        if load > 0 and not np.isclose(load, [each for each, *_ in drawn], rtol=_SAME_LOAD, atol=0).any():
+            drawn.append((load, look["color"], line.runs.drawn_name._replace(curve="Persson")))
+    several, look = len(drawn) > 1, {"lw": 0.9, "zorder": 2}
+    for load, colour, name in drawn:
+        density = persson_pressure_density(p, load)
+        plot(ax, p, density, name if several else "Persson", color=colour if several else BLACK, **look)
+    if drawn:
+        ax.plot([], [], color=GREY if several else BLACK, label="Persson", **look)
+        say(
+            ax,
+            "The black line is Persson's theory of contact without adhesion."
+            if not several
+            else """Thin lines without markers are Persson's theory of contact without adhesion, at the reduced pressure
+            of the runs of the same colour; runs at the same pressure share a line.""",
+        )
 
 
 def _draw_singular_tail(ax, line, lowest, colour):

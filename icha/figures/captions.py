@@ -10,7 +10,7 @@ import numpy as np
 
 from icha.contact.attraction import FINITE_RANGE, SHORT_RANGE
 from icha.datasets.labels import LABELS
-from icha.figures.select import has_shape, lacks_fit, lacks_sphere
+from icha.figures.select import has_layer, has_shape, lacks_fit, lacks_sphere
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -53,9 +53,9 @@ def units_of_shapes(figure: Figure, studies: Sequence[xr.Dataset]) -> str:
 
 
 def theories_of_flat_surfaces(study: xr.Dataset) -> str:
-    """Return why no theory is drawn, if the first surface of a study has a shape."""
+    """Return why no theory is drawn, if the first surface has a shape, or for which runs theories do not hold."""
     if not has_shape(study.isel(surface=0)):
-        return ""
+        return "Theories are those of a half-space, and do not hold for runs on a layer." if has_layer(study) else ""
     return """Theories of rough contact are for nominally flat surfaces. They do not hold under a shape, so none is
     drawn."""
 

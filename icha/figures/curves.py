@@ -34,6 +34,8 @@ _COMMON = "Means are at common loads, interpolated between the computed states o
 _UNLOADING = {"ls": BRANCH_DASHES["unloading"], "lw": 0.7, "zorder": 2.2}
 # A value counts as a rounding error if it is at most this fraction of the largest value.
 _ROUNDING = 1e-7
+# Loads below this part of the largest one of a leg count as separation.
+_LEAST_LOAD = 1e-6
 # Theories are drawn beyond the limits of the load axis by this factor.
 _BEYOND = 1.5
 
@@ -258,10 +260,11 @@ def _draw_unloading(axes, line, panel):
     names = line.runs.names_of_seeds
     for name, leg in [(names[k], leg) for k, run in line.runs.by_seed.items() for leg in select.unloading_legs(run)]:
         load, values = panel.points(leg)
+        pressed = load > _LEAST_LOAD * np.max(load, initial=0.0)
+        load, values = load[pressed], values[pressed]
         record(axes, load, values, name._replace(curve=f"{name.curve}, unloading"))
         # Loads just before separation are arbitrarily small, so the line must not affect the limits of the axes.
-        pressed = np.where(load > 0, load, np.nan)
-        axes.add_artist(legend_handle(pressed, values, color=line.look["mec"], **_UNLOADING))
+        axes.add_artist(legend_handle(load, values, color=line.look["mec"], **_UNLOADING))
         axes.plot([], [], color=GREY, label="unloading", **_UNLOADING)
         say(axes, "Thin dashed lines show unloading at compressive loads, for every seed.")
 

@@ -142,6 +142,13 @@ def has_shape(study: xr.Dataset) -> bool:
     return "shape" in study and bool((study["shape"] != "").any())
 
 
+def has_layer(study: xr.Dataset) -> bool:
+    """Return whether a run of a study is on a layer of finite thickness."""
+    thickness, compression = study.get("layer_thickness"), study.get("layer_compression")
+    free = thickness is not None and bool(np.isfinite(thickness).any())
+    return free or (compression is not None and bool((np.abs(compression) > 0).any()))
+
+
 def lacks_sphere(study: xr.Dataset) -> bool:
     """Return whether a study has surfaces without the radius of a sphere, or layers of finite thickness."""
     radius, thickness = study.get("shape_radius"), study.get("layer_thickness")
@@ -214,13 +221,18 @@ def select_complete_run(campaign: xr.DataTree, labels: RunLabels) -> xr.Dataset:
 
 
 def path_steps(run: xr.Dataset) -> xr.Dataset:
-    """Return the steps of the first loading at targets of the study, only for the most frequent kind of target."""
+    """Return the steps of the first loading at targets of the study, only for the most frequent kind of target.
+
+    Steps at zero load are left out: their load is only an error of the solver.
+    """
     from icha.datasets.campaign import loading_stops
+    from icha.path.targets import LOADS
 
     run = run.isel(step=loading_stops(run).values)
     kinds = [str(kind) for kind in run["step_kind"].values]
     main = max(dict.fromkeys(kinds), key=kinds.count, default=None)
-    return run.isel(step=[kind == main for kind in kinds])
+    unloaded = (run["step_target"].values == 0) & (main in LOADS)
+    return run.isel(step=[kind == main for kind in kinds] & ~unloaded)
 
 
 def branches(run: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:

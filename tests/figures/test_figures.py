@@ -31,6 +31,7 @@ from icha.figures.style import (
     format_quantity,
     save,
 )
+from icha.references.persson import persson_pressure_density
 from icha.references.theories import reference_dataset
 from icha.support.statistics import ensemble
 from icha.surfaces.moments import spectral_moments
@@ -294,6 +295,27 @@ def test_fig3_shows_boundary_elements_of_the_same_state():
     u, densities = at_one_load.gap_densities(members)
     np.testing.assert_allclose(left.get_xydata(), np.transpose([u, densities.mean(axis=0)]), rtol=1e-9)
     assert right.get_xdata().min() < 0 and left.get_color() == right.get_color() == colours["soft"]
+
+
+def test_fig3_draws_persson_at_the_load_of_each_run():
+    """At one area, runs with and without adhesion have different loads; the pressure has the load as its integral."""
+    figure = at_one_load.distributions(small.tree(), study="slopes", kind="area_fraction", target=0.015)
+    drawn = [points for _, points in figure.recorded if points["curve"] == "Persson"]
+    for points in drawn:
+        run = small.run(1, points["rms_slope"], points["material"])
+        at = int(np.flatnonzero(run["snapshot_kind"] == "area_fraction")[0])
+        load = float(run["reduced_pressure"][int(run["snapshot_step"][at])])
+        wide = np.linspace(0, 5, 20000)
+        density = persson_pressure_density(wide[1:], load)
+        assert np.trapezoid(wide[1:] * density, wide[1:]) == pytest.approx(load, rel=1e-3)
+        np.testing.assert_allclose(points["y"], persson_pressure_density(points["x"], load), rtol=1e-9)
+    assert len({points["material"] for points in drawn}) == 2
+
+
+def test_steps_at_zero_load_are_not_on_logarithmic_axes():
+    run = small.run().copy(deep=True)
+    run["step_target"][0], run["reduced_pressure"][0] = 0.0, 1e-13
+    assert path_steps(run).sizes["step"] == path_steps(small.run()).sizes["step"] - 1
 
 
 def test_fig4_puts_the_contact_of_boundary_elements_beside_the_spots(surface):
