@@ -23,8 +23,8 @@ from icha.planning.run_costs import run_costs
 _SHORT_BATCHES, _SHORT = 4, 0.2
 # Expected time of a figure, s.
 _FIGURE = 1.6
-# Largest number of files in a batch. Snakemake's time for planning is proportional to the number.
-_MOST_FILES = 60
+# Largest number of files in a batch. For each input, Snakemake searches the list of outputs of the batch.
+_MOST_FILES = 180
 T = TypeVar("T")
 
 
