@@ -12,13 +12,12 @@ from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of, quantity
 from icha.figures import curves
 from icha.figures.captions import theories_of_flat_surfaces
-from icha.figures.curves import Panel, draw_theory
+from icha.figures.curves import Panel, draw_theory, panel_in_units
 from icha.figures.drawn import Name, plot, record, say
 from icha.figures.ensembles import draw_members
 from icha.figures.looks import ASPERITIES_NAME, MODEL_MARKERS, REFERENCE_NAME, TRUTH_LINE, model_handle, surface_label
 from icha.figures.select import NothingToDraw, has_shape
 from icha.figures.style import BLACK, DASHES, GREY, in_style, logarithmic_axes, new_panels
-from icha.support.formatting import choose_unit
 from icha.support.tables import read_columns
 
 if TYPE_CHECKING:
@@ -77,7 +76,7 @@ def area_and_gap(
     """
     shown, dataset = curves.study_curves(campaign, study), campaign[study].to_dataset()
     physical, gap_words = units == "physical", label_of(curves.gap_name(dataset)).partition("  ")[0]
-    panels = _physical_panels(dataset) if physical else _reduced_panels(dataset)
+    panels = _panels(dataset, physical=physical)
     truths = {} if physical else {truth.runs.contact: truth for truth in shown.crosses}
     compared = [(line, truths[line.runs.contact]) for line in shown.lines if line.runs.contact in truths]
     fig, axes = new_panels(4.5, 2, sharex=True, height_ratios=(1, _LOWER)) if compared else new_panels(3.3)
@@ -104,7 +103,7 @@ def area_and_gap(
         say(fig, _PERSSON)
         _draw_persson(axes[0], panels, references, x, unit)
     for ax, panel in zip(axes[0], panels, strict=True):
-        panel.label(ax)
+        panel.label(ax, lowest=not compared)
     if not physical:
         curves.limit_ratios(left, areas)
         low, high = gaps.min() / 1.4, gaps.max() * 1.4
@@ -116,8 +115,6 @@ def area_and_gap(
     if compared:
         say(fig, _COMPARED)
         _draw_differences(axes[1], shown, compared, panels[1].y)
-        for ax in axes[0]:
-            ax.set_xlabel("")
     say(fig, "" if physical else theories_of_flat_surfaces(dataset))
     for ax in axes[-1]:
         ax.set(xlim=x, xlabel=label_of(panels[0].x, panels[0].units[0]))
@@ -125,18 +122,12 @@ def area_and_gap(
     return fig
 
 
-def _reduced_panels(dataset):
+def _panels(dataset, *, physical):
+    """Return panels of area over load, or of area in physical units, and of the mean gap."""
+    if physical:
+        area, gap = (panel_in_units("nominal_pressure", y, dataset) for y in ("contact_area_fraction", "mean_gap"))
+        return area, gap
     return Panel("reduced_pressure", "area_over_load"), Panel("reduced_pressure", curves.gap_name(dataset))
-
-
-def _physical_panels(dataset):
-    """Return panels of area and mean gap against nominal pressure, in units with prefixes for a study."""
-    (per_pascal, pressure), (per_metre, length) = (
-        choose_unit(float(np.abs(dataset[name]).max()), unit)
-        for name, unit in (("nominal_pressure", "Pa"), ("mean_gap", "m"))
-    )
-    area = Panel("nominal_pressure", "contact_area_fraction", (per_pascal, 1.0), (pressure, ""))
-    return area, Panel("nominal_pressure", "mean_gap", (per_pascal, per_metre), (pressure, length))
 
 
 def _only_unit(shown):
@@ -388,9 +379,7 @@ def multi_slope(
             words = [surface_label(campaign, surface)] if surface else []
             words += [looks.material_name(materials[0])] if own_rows else []
             ax.set_title(", ".join(words), loc="right", fontsize=8)
-            panel.label(ax)
-            if ax not in panels[-1]:
-                ax.set_xlabel("")
+            panel.label(ax, lowest=materials is rows[-1])
             ratios += [values] if panel is ratio else []
         for ax in row[[panel is ratio for panel, _ in columns]]:
             curves.limit_ratios(ax, np.concatenate(ratios))

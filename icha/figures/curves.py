@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from icha.contact.models import REFERENCE_MODEL
-from icha.datasets.quantities import label_of
+from icha.datasets.quantities import label_of, quantity
 from icha.figures import select
 from icha.figures.captions import attractions_of, range_of_attraction
 from icha.figures.drawn import Name, plot, record, say
@@ -23,6 +23,7 @@ from icha.figures.looks import (
     model_handle,
 )
 from icha.figures.style import GREY, legend_handle, logarithmic_axes
+from icha.support.formatting import choose_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,9 +62,23 @@ class Panel(NamedTuple):
         known = np.isfinite(x) & np.isfinite(y)
         return x[known], y[known]
 
-    def label(self, axes: Axes) -> None:
-        """Label both axes."""
-        axes.set(xlabel=label_of(self.x, self.units[0]), ylabel=label_of(self.y, self.units[1]))
+    def label(self, axes: Axes, *, lowest: bool = True) -> None:
+        """Label both axes; the x axis only of the `lowest` of several panels."""
+        axes.set_ylabel(label_of(self.y, self.units[1]))
+        if lowest:
+            axes.set_xlabel(label_of(self.x, self.units[0]))
+
+
+def panel_in_units(x: str, y: str, *data: xr.Dataset) -> Panel:
+    """Return a panel in units with prefixes that fit the largest magnitudes in some datasets."""
+
+    def scale(name):
+        unit = quantity(name).unit
+        most = max(float(np.abs(each[name]).max()) for each in data)
+        return (1.0, "") if unit == "1" else choose_unit(most or 1.0, unit)
+
+    factors, units = zip(scale(x), scale(y), strict=True)
+    return Panel(x, y, factors, units)
 
 
 def quantity_of(states: xr.Dataset | Mapping[str, np.ndarray], name: str) -> np.ndarray:

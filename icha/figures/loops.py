@@ -18,7 +18,7 @@ from icha.figures.captions import (
     range_of_attraction,
     without_fit,
 )
-from icha.figures.curves import Panel
+from icha.figures.curves import Panel, panel_in_units
 from icha.figures.drawn import Name, plot, record, say
 from icha.figures.indenter_curves import select_series, theory_curves
 from icha.figures.looks import (
@@ -149,9 +149,7 @@ def loops(
         for ax, panel in ((left, pressures), *((ax, pressures) for ax in middle), (right, areas)):
             for loop in shown_loops:
                 _draw(ax, loop, panel, turn=len(slopes) > 1)
-            panel.label(ax)
-            if ax not in panels[-1]:
-                ax.set_xlabel("")
+            panel.label(ax, lowest=shown_loops is by_row[-1])
         for ax in middle:
             ax.axhline(0, color=GREY, lw=0.5, zorder=1)
             ax.xaxis.set_major_locator(MaxNLocator(4))
@@ -178,12 +176,8 @@ def _panels(dataset, *, physical):
     """Return panels of load against separation, and of area against load."""
     if not physical:
         return Panel("reduced_separation", "reduced_pressure"), Panel("reduced_pressure", "contact_area_fraction")
-    (per_metre, length), (per_pascal, pressure) = (
-        choose_unit(float(np.abs(dataset[name]).max()), unit)
-        for name, unit in (("mean_separation", "m"), ("nominal_pressure", "Pa"))
-    )
-    loads = Panel("mean_separation", "nominal_pressure", (per_metre, per_pascal), (length, pressure))
-    return loads, Panel("nominal_pressure", "contact_area_fraction", (per_pascal, 1.0), (pressure, ""))
+    loads = panel_in_units("mean_separation", "nominal_pressure", dataset)
+    return loads, panel_in_units("nominal_pressure", "contact_area_fraction", dataset)
 
 
 def _draw(ax, loop, panel, *, turn):
@@ -297,11 +291,7 @@ def force_indentation(campaign: xr.DataTree, *, study: str) -> Figure:
     series = select_series(campaign, study)
     runs = [run for each in series for run in each.runs.by_seed.values()]
     names = "indentation", "force"
-    (per_metre, length), (per_newton, newton) = (
-        choose_unit(max(float(np.abs(run[name]).max()) for run in runs), unit)
-        for name, unit in (("indentation", "m"), ("force", "N"))
-    )
-    panel = Panel(*names, (per_metre, per_newton), (length, newton))
+    panel = panel_in_units(*names, *runs)
     limits = [_limits(values) for values in map(np.concatenate, zip(*map(panel.points, runs), strict=True))]
     by_height = not any(each.contact for each in series)
     together = len(series) <= _MOST_SERIES and by_height

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.datasets.quantities import quantity
-from icha.figures.curves import Panel
+from icha.figures.curves import panel_in_units
 from icha.figures.maps import draw_spots
 from icha.figures.style import BLUE, GREEN, GREY, VERMILLION, in_style, new_panels
 from icha.support.formatting import choose_unit
@@ -105,19 +104,10 @@ def plot_jkr_test(test: JKRTest) -> Figure:
 
 
 def _plot_against_pressure(run, name, axes, look):
-    axes = _new_axes() if axes is None else axes
-    names = "nominal_pressure", name
-    factors, units = zip(*(_unit(run, each) for each in names), strict=True)
-    panel = Panel(*names, factors, units)
+    axes, panel = _new_axes() if axes is None else axes, panel_in_units("nominal_pressure", name, run)
     axes.plot(*panel.points(run), **{"marker": "o", "ms": 3} | look)
     panel.label(axes)
     return axes
-
-
-def _unit(run, name):
-    """Return factor and unit of an axis; areas are fractions."""
-    unit, most = quantity(name).unit, float(np.abs(run[name].values).max(initial=0.0))
-    return (1.0, "") if unit == "1" else choose_unit(most or 1.0, unit)
 
 
 def _new_axes():
