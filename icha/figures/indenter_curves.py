@@ -108,8 +108,10 @@ def theory_curves(run: xr.Dataset, largest_radius: float) -> dict[str, tuple[np.
     radius, modulus, energy = sphere
     hertz = sphere_contact(np.linspace(0, largest_radius, _POINTS), radius, modulus)
     curves = {"Hertz": (hertz.indentation, hertz.force)}
-    if energy:
-        smallest = float(sphere_jump_off(radius, modulus, energy).contact_radius)
-        jkr = sphere_contact(np.linspace(smallest, largest_radius, _POINTS), radius, modulus, energy)
-        curves = {"JKR": (jkr.indentation, jkr.force)} | curves
+    receding = float(run["receding_energy"])
+    for name, work in (("JKR, receding", receding if receding > energy else 0.0), ("JKR", energy)):
+        if work:
+            smallest = float(sphere_jump_off(radius, modulus, work).contact_radius)
+            jkr = sphere_contact(np.linspace(smallest, largest_radius, _POINTS), radius, modulus, work)
+            curves = {name: (jkr.indentation, jkr.force)} | curves
     return curves

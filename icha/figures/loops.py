@@ -272,13 +272,18 @@ def _handles(looks, loops, *, marked):
 # Largest number of series in a panel.
 _MOST_SERIES = 3
 _LOOP = {"lw": 0.9, "alpha": 0.85}
-_THEORIES = {"JKR": {"color": GREY, "lw": 2.4, "alpha": 0.45}, "Hertz": {"color": GREY, "lw": 0.9, "ls": ":"}}
+_THEORIES = {
+    "JKR": {"color": GREY, "lw": 2.4, "alpha": 0.45},
+    "JKR, receding": {"color": GREY, "lw": 2.4, "alpha": 0.25},
+    "Hertz": {"color": GREY, "lw": 0.9, "ls": ":"},
+}
 _THEORY_WORDS = {
     "Hertz": """The dotted line is the theory of Hertz for a smooth sphere with the radius and the modulus of the runs
     in the same panel.""",
     "JKR": """The wide grey line is the theory of Johnson, Kendall and Roberts (JKR) for this sphere with the work of
     adhesion of these runs, with the states that are unstable under load control, from the pull-off force to the
     jump-off under displacement control.""",
+    "JKR, receding": "That line is for advancing edges; the paler one has the work of adhesion of receding edges.",
 }
 
 
@@ -326,7 +331,7 @@ def force_indentation(campaign: xr.DataTree, *, study: str) -> Figure:
         ax.set_xlabel(label_of(panel.x, panel.units[0]))
     for ax in panels[::columns]:
         ax.set_ylabel(label_of(panel.y, panel.units[1]))
-    say(fig, *(_THEORY_WORDS[name] for name in ("Hertz", "JKR") if name in theories))
+    say(fig, *(_THEORY_WORDS[name] for name in ("Hertz", "JKR", "JKR, receding") if name in theories))
     dataset = campaign[study].to_dataset()
     if "JKR" in theories and (dataset["surface_energy"] == 0).any():
         say(fig, "Runs without adhesion have no line of JKR.")
@@ -352,7 +357,7 @@ unloading up to the largest tension (b). Here F is the force, R the radius of th
 circle with the true contact area. A smooth sphere with a Tabor parameter of 3 or more gives a straight line of slope
 3/(4 E*), and the work of adhesion w follows from the value at F = 0, 3 sqrt(8 π E* w)/(4 E*). Markers are states of all
 seeds, at most one hundred of each run at equal steps of the indentation. States with F/a^(3/2) below -sqrt(8 π E* Δγ),
-where no sphere of JKR has contact, are not shown. Lines are fits of JKR with the given E* and R, one for each seed. A
+where no sphere of JKR has contact (Δγ of receding edges), are not shown. Lines are fits of JKR with the given E* and R, one for each seed. A
 fit minimises the squared differences of a³ at given F, so states with a large radius have most weight. The legend gives
 the means over the seeds of the fitted work of adhesion."""
 
