@@ -93,14 +93,21 @@ def reproduce(
 
     The command verifies the deposit and does not change any file. The installed ICHA computes the configuration of the
     deposit, and must have the version that made the deposit. The command lists packages that have other versions. No
-    code of the deposit is executed. The command reports each
+    code of the deposit is executed, so a campaign with scripts of its own gets no figures. The command reports each
     variable as identical, within tolerance, or different. With `--only smallest` the command takes some minutes.
 
     Exit status: 0 if all variables are identical or within tolerance, 1 if a variable differs or the computation
     fails or is stopped, 2 if the deposit is damaged or missing, or cannot be computed again.
     """
     from icha.deposit.compare import compare_folders
-    from icha.deposit.reproduce import RerunError, add_surfaces, campaign_name, find_runs, prepare_rerun
+    from icha.deposit.reproduce import (
+        RerunError,
+        add_surfaces,
+        campaign_name,
+        find_runs,
+        prepare_rerun,
+        results_without_scripts,
+    )
 
     target = None if folder is None else folder.resolve()
     keep = folder is not None
@@ -111,12 +118,16 @@ def reproduce(
             _introduce(deposit, original, folder)
             target = target or Path(tempfile.mkdtemp(prefix="icha-reproduce-")).resolve()
             copy = prepare_rerun(target, original)
-            status = _run(copy, [f"results/{name}/{path}" for path in runs] or ["all"], cores)
+            chosen = runs or results_without_scripts(copy)
+            if chosen and not runs:
+                echo("figures:    not drawn and not compared, because scripts of the deposit would run")
+            status = _run(copy, [f"results/{name}/{path}" for path in chosen] or ["all"], cores)
             results = copy / "results" / name
             if not results.is_dir():
                 echo("Error: nothing was computed", err=True, fg="red")
                 raise typer.Exit(FAILED)
-            comparison = compare_folders(original, results, add_surfaces(runs, original) if runs else None)
+            compared = add_surfaces(runs, original) if runs else chosen or None
+            comparison = compare_folders(original, results, compared)
         reproduced = _print_comparison(comparison)
         keep = keep or not reproduced
     except RerunError as refused:

@@ -18,6 +18,7 @@ from icha.datasets.results import CONFIGURATION, RUN
 from icha.datasets.stamp import read_stamp
 from icha.deposit.program import version_differences
 from icha.deposit.verify import CHECKSUMS, SOURCE, files_of, read_text
+from icha.planning.results import campaign_files
 from icha.support.checksums import sha256_of
 from icha.support.formatting import format_count
 from icha.support.values import NAME_PATTERN
@@ -109,6 +110,17 @@ def add_surfaces(runs: Iterable[str], deposit: Path) -> list[str]:
     """Return the paths of runs and of the surfaces of these runs; leave out surfaces that are not in the deposit."""
     surfaces = dict.fromkeys("surfaces/{2}/{3}.nc".format(*run.split("/")) for run in runs)
     return [*runs, *(path for path in surfaces if (deposit / path).is_file())]
+
+
+def results_without_scripts(project: Path) -> list[str]:
+    """Return the results to compute, relative to the folder of results, if the figures of a rerun include own scripts.
+
+    The scripts of a deposit must not run, so no figure and no report is made. Without scripts the list is empty, and
+    everything is computed.
+    """
+    campaign = load_configuration(project / CONFIGURATION, within=project).campaign
+    files = campaign_files(campaign)
+    return [*files.verified, files.verdict] if campaign.figures.model_extra else []
 
 
 def prepare_rerun(folder: Path, deposit: Path) -> Path:

@@ -204,6 +204,17 @@ def test_damaged_deposits_and_those_without_results_are_refused(deposit, reprodu
     assert reproduce(tmp_path / "none")[0] == 2 and not computed
 
 
+def test_scripts_of_own_figures_are_not_asked_for(deposit, reproduce, computed, tmp_path):
+    script = 'def draw(study):\n    """Own."""\n    return study\n'
+    text = CAMPAIGN.format(path="inputs/z.npy") + "figures:\n  own: {study: load, script: inputs/figures/own/own.py}\n"
+    packed = deposit(**{"config.used.yaml": text, "inputs/figures/own/own.py": script})
+    _, output = reproduce(packed)
+    [(_, targets, _)] = computed
+    assert "scripts of the deposit would run" in output
+    assert "results/tiny/verdict.txt" in targets and f"results/tiny/runs/{SOFT}.nc" in targets
+    assert not [each for each in targets if each == "all" or "figures" in each or "report" in each]
+
+
 @pytest.mark.slow
 def test_nothing_in_a_deposit_is_executed(deposit, reproduce, tmp_path, monkeypatch):
     """For real, wherever the command is called: neither the source, nor what lies beside configuration and inputs."""
