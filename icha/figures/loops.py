@@ -352,14 +352,14 @@ _TITLES = {"approach": ("loading", "o"), "retraction": ("unloading", "s")}
 _STATES = {"ls": "none", "ms": 2.8, "mew": 0.6, "mfc": "white"}
 _FIT = {"lw": 0.9, "ls": "-"}
 
-_LINE = """Linearised plot of the equation of Johnson, Kendall and Roberts (JKR), for the first loading (a) and the last
-unloading up to the largest tension (b). Here F is the force, R the radius of the smooth sphere, and a the radius of a
-circle with the true contact area. A smooth sphere with a Tabor parameter of 3 or more gives a straight line of slope
-3/(4 E*), and the work of adhesion w follows from the value at F = 0, 3 sqrt(8 π E* w)/(4 E*). Markers are states of all
-seeds, at most one hundred of each run at equal steps of the indentation. States with F/a^(3/2) below -sqrt(8 π E* Δγ),
-where no sphere of JKR has contact (Δγ of receding edges), are not shown. Lines are fits of JKR with the given E* and R, one for each seed. A
-fit minimises the squared differences of a³ at given F, so states with a large radius have most weight. The legend gives
-the means over the seeds of the fitted work of adhesion."""
+_LINE = """Linearised plot of the equation of Johnson, Kendall and Roberts (JKR), for the first loading (a) and the
+last unloading up to the largest tension (b). Here F is the force, R the radius of the smooth sphere, and a the radius
+of a circle with the true contact area. A smooth sphere with a Tabor parameter of 3 or more gives a straight line of
+slope 3/(4 E*), and the work of adhesion w follows from the value at F = 0, 3 sqrt(8 π E* w)/(4 E*). Markers are states
+of all seeds, at most one hundred of each run at equal steps of the indentation. States with F/a^(3/2) below -sqrt(8 π
+E* Δγ), where no sphere of JKR has contact (Δγ of receding edges), are not shown. Lines are fits of JKR with the given
+E* and R, one for each seed. A fit minimises the squared differences of a³ at given F, so states with a large radius
+have most weight. The legend gives the means over the seeds of the fitted work of adhesion."""
 
 
 @in_style
