@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 from conftest import REPOSITORY
 
-from icha.datasets.files import write_dataset
+from icha.datasets.files import read_dataset, write_dataset
 from icha.datasets.stamp import NAMES, read_stamp
 from icha.datasets.surface_file import read_surface
 from icha.support.checksums import sha256_of
@@ -155,6 +155,7 @@ def test_another_licence_is_stated_without_computing(prepare):
         write_dataset(DATASET.assign_attrs(stamp), path)
         prepare.Results("results/tiny", "tiny.yaml", {path: stamp | {"license": "CC0-1.0"}})
         assert read_stamp(path) == stamp | {"license": "CC0-1.0"}
+        assert read_dataset(path).equals(DATASET)
 
 
 def test_targets_are_found_among_the_arguments_of_snakemake(prepare):
