@@ -13,9 +13,9 @@ import pytest
 from conftest import REPOSITORY, SMOKE, copy_project, snakemake
 from tiny_campaign import CAMPAIGN
 
-AFTER_RUNS = {"analyse", "verdict", "draw_figures", "report_page"}
-# Beginnings of the names of rules of batches.
-BATCHES = ("make_surfaces", "compute_theories", "run", "draw_figures")
+AFTER_RUNS = {"analyse", "verdict", "draw_figures", "draw_figure", "report_page"}
+# Beginnings of the names of rules of batches and of own figures.
+BATCHES = ("make_surfaces", "compute_theories", "run", "draw_figures", "draw_figure")
 
 
 def planned(project, *arguments):
