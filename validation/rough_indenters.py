@@ -189,7 +189,7 @@ def without_adhesion(kind: str, grid: int = 64) -> Iterator[dict]:
         for separation, pressure, gap in zip(separations, answer["pressures"], answer["gaps"], strict=True):
             # Separations of ContactMechanics include the displacement of a layer by the mean pressure.
             state = contact.equilibrium(state, separation + uniform * pressure.mean())
-            mine = contact.crop(contact.space.field(state.cells, state.pressure))
+            mine = contact.crop(contact.field(state.cells, state.pressure))
             yield {
                 "kind": kind,
                 "thickness": layer[0] if layer else None,
@@ -214,9 +214,7 @@ def _solve_with_contactmechanics(surface, separations, layer):
         return dict(np.load(answer))
 
 
-def layer_limits(
-    grid: int = 64, thicknesses: Sequence[float] = (100, 20, 0.2, 0.1, 0.05, 0.03, 0.02)
-) -> Iterator[dict]:
+def layer_limits(grid: int = 64, thicknesses: Sequence[float] = (100, 20, 0.2, 0.1, 0.07)) -> Iterator[dict]:
     """Press a sphere without adhesion on a free layer of Poisson ratio 0.3, and compare it with thick and thin layers.
 
     The force on a thick layer is Hertz's with the correction of E. K. Dimitriadis et al., Biophys. J. 82 (2002) 2798,

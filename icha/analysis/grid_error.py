@@ -97,11 +97,13 @@ def length_in_cells(surface_energy, contact_modulus, rms_curvature, spacing):
 def cells_of_length(runs: xr.Dataset) -> xr.DataArray:
     """Return the cells in the length l of a run, or of each run of a study.
 
-    NaN without adhesion, and for a surface with a shape, because a whole sphere is pulled off such a surface.
+    NaN without adhesion, with works of adhesion by direction, for which the errors are not known, and for a surface
+    with a shape, because a whole sphere is pulled off such a surface.
     """
     names = ("surface_energy", "contact_modulus", "rms_curvature")
     cells = length_in_cells(*(runs[name] for name in names), runs["period"] / runs["grid"])
-    return cells.where((runs["surface_energy"] > 0) & _without_shape(runs))
+    one = runs.get("receding_energy", runs["surface_energy"]) == runs["surface_energy"]
+    return cells.where((runs["surface_energy"] > 0) & one & _without_shape(runs))
 
 
 def _without_shape(runs):

@@ -489,6 +489,10 @@ _WORKS = {
     "work_of_adhesion_retraction": ("JKR fit to unloading", "s"),
     "pull_off_force_over_jkr": ("pull-off force over that of JKR", "^"),
 }
+_UNITS_OF_WORK = {
+    "work_of_adhesion_approach": "surface_energy",
+    "work_of_adhesion_retraction": "receding_energy",
+}
 _ONE_SEED = {"ls": "none", "ms": 3.2, "mew": 0.6, "mfc": "white"}
 _MEAN = {"lw": 0.9, "ms": 5.0}
 
@@ -498,6 +502,7 @@ squares fits to the last unloading up to the largest tension. Each fit compares 
 with the given E* and R. Triangles are the pull-off force divided by the pull-off force 3/2 π Δγ R of a smooth sphere.
 Closed markers are means over the seeds; open markers are the single seeds. Lines join means of the same surface or
 shape and the same material. Values of a smooth sphere by JKR are 1."""
+_DIRECTED = "For circles, Δγ is that of advancing edges; for squares and triangles, that of receding edges."
 
 
 @in_style
@@ -516,15 +521,20 @@ def work_of_adhesion(campaign: xr.DataTree, *, study: str) -> Figure:
     fig = new_figure(1.25 * ONE_COLUMN, 2.9)
     ax = fig.subplots()
     dataset = campaign[study].to_dataset()
-    say(fig, _WORK, without_fit(dataset), only_spheres(dataset))
+    directed = bool((dataset["receding_energy"] > dataset["surface_energy"]).any())
+    say(fig, _WORK, _DIRECTED if directed else "", without_fit(dataset), only_spheres(dataset))
     handles = {name: legend_handle(color=colour, lw=4) for name, colour in colours.items() if name}
     for (k, (quantity, (name, marker))), contact in itertools.product(enumerate(_WORKS.items()), contacts):
         # Colours distinguish the quantities, or surfaces and materials if there are several.
         colour, means = colours[contact] if contact else COLOURS[k], []
         for group in (each.runs for each in series if each.contact == contact):
-            unit_of_work = 1.0 if quantity == "pull_off_force_over_jkr" else group.surface_energy
+            unit_of_work = _UNITS_OF_WORK.get(quantity)
             runs = [run for run in group.by_seed.values() if quantity in run]
-            points = [(float(run["rms_height"]) * scale, float(run[quantity]) / unit_of_work) for run in runs]
+            units = [float(run[unit_of_work]) if unit_of_work else 1.0 for run in runs]
+            points = [
+                (float(run["rms_height"]) * scale, float(run[quantity]) / unit)
+                for run, unit in zip(runs, units, strict=True)
+            ]
             if points:
                 of_seeds = Name(f"{name}, single seeds", group.labels._replace(seed=None))
                 plot(ax, *np.transpose(points), of_seeds, marker=marker, mec=colour, **_ONE_SEED)

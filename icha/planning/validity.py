@@ -108,8 +108,8 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
             return {}
         material = Material(**campaign.materials[case.material].model_dump(exclude_none=True))
         spacing = campaign.period(case.surface) / campaign.grid(case.surface)
-        tension = straight_strength(material.adhesion_length / spacing) * material.contact_modulus
-        return {STRENGTH: material.interface_strength, RESOLVED: tension, SPACING: spacing}
+        tension = straight_strength(material.receding.adhesion_length / spacing) * material.contact_modulus
+        return {STRENGTH: material.receding.interface_strength, RESOLVED: tension, SPACING: spacing}
 
     # Contacts that differ only in the seed have the same expected properties.
     for case in dict.fromkeys(case._replace(seed=0) for case in run_cases(campaign)):
@@ -129,8 +129,8 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
             "full_contact_energy_ratio": energy_ratio(campaign, case),
             SHAPED: float(campaign.surfaces[case.surface].shape is not None),
             COMPLETE: facts[COMPLETE] * case.rms_slope * material.contact_modulus,
-            STRENGTH: material.interface_strength,
-            THEORETICAL: material.theoretical_strength,
+            STRENGTH: material.receding.interface_strength,
+            THEORETICAL: material.receding.theoretical_strength,
             **range_of_attraction,
         }
         section = campaign.surfaces[case.surface]
@@ -143,7 +143,9 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
         if MODELS[case.model].by_cells:
             known |= resolved_tension(case)
             spacing = known[SPACING]
-            if campaign.studies[case.study].unload and material.surface_energy > 0 and not section.shape:
+            # The error of loops is known for one work of adhesion only.
+            adhesive = material.surface_energy > 0 and not material.directed
+            if campaign.studies[case.study].unload and adhesive and not section.shape:
                 lengths = material.surface_energy, material.contact_modulus, rms_curvature(campaign, case), spacing
                 key = case.material, case.surface
                 loops[key] = min(float(length_in_cells(*lengths)), loops.get(key, math.inf))

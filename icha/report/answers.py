@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from icha.analysis.control_variates import PROBABILITY
+from icha.analysis.control_variates import PROBABILITY, quantile
 from icha.analysis.estimates import LOOP
 from icha.analysis.sensitivity import response_words
 from icha.datasets.quantities import quantity, state_words
@@ -72,6 +72,8 @@ class Answer(NamedTuple):
         unit = f" {self.unit}" if self.unit else ""
         if math.isnan(self.half_width):
             return f"{self.value:.3g}{unit}"
+        if not self.half_width:
+            return f"{self.value:.4g}{unit} in every run"
         digits = self._digits
         interval = f" ± {self.half_width:.{digits}f}{unit}"
         if self.half_width > _WIDE * abs(self.value):
@@ -82,7 +84,7 @@ class Answer(NamedTuple):
     def number(self) -> str:
         """Estimate with interval, the contributions to the interval, and the note, as text."""
         parts = ", ".join(f"{name} {part:.{self._digits}f}" for name, part in self.shares.items())
-        return self.estimate + ("" if math.isnan(self.half_width) else f" ({parts})") + self.note
+        return self.estimate + (f" ({parts})" if self.half_width > 0 else "") + self.note
 
 
 def answers_of(study: xr.Dataset) -> list[Answer]:
@@ -133,7 +135,7 @@ def _limit(row, shares):
     variances |= {cause: 0.0 if math.isnan(shares[cause]) else shares[cause] ** 2 for cause in ("grid", "inputs")}
     total, level = sum(variances.values()), max(variances, key=variances.__getitem__)
     if not total:
-        return "The seeds do not differ, and no other error is known."
+        return "The seeds do not differ, which gives no interval, and no other error is known."
     width = f"± {100 * math.sqrt(variances[level]):.2g} % of the value"
     if level == "inputs":
         return (
@@ -142,10 +144,12 @@ def _limit(row, shares):
         )
     if level == "grid":
         return f"The grid limits the accuracy: {width}. A finer grid would narrow it."
-    narrower = 1 - math.sqrt((total - variances[level] / 2) / total)
+    seeds, freedom = int(row[level]), float(row["degrees_of_freedom"])
+    of_more = quantile(freedom * (2 * seeds - 1) / max(seeds - 1, 1)) / quantile(freedom)
+    narrower = 1 - of_more * math.sqrt((total - variances[level] / 2) / total)
     unknown = " The error of the grid is unknown." if math.isnan(shares["grid"]) else ""
     return (
-        f"The {int(row[level])} seeds of {_LEVELS[level]} limit the accuracy: with twice as many, the interval would "
+        f"The {seeds} seeds of {_LEVELS[level]} limit the accuracy: with twice as many, the interval would "
         f"be {100 * narrower:.0f} % narrower.{unknown}"
     )
 
