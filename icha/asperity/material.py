@@ -125,15 +125,14 @@ class Material:
         receding = self.receding_energy
         return self if receding is None else replace(self, surface_energy=receding, receding_energy=None)
 
-    def adhesion_length_on(self, grid: int, side: float, *, periodic: bool) -> np.ndarray | float:
-        """Return the elasto-adhesive length at the nodes of a square, (n, n), m; a number without a map.
+    def relative_energy(self, grid: int, side: float, *, periodic: bool) -> np.ndarray | float:
+        """Return the work of adhesion over its mean at the nodes of a square, (n, n); 1 without a map.
 
         Raises `ValueError` if the map does not fit the square.
         """
         if self.adhesion_map is None:
-            return self.adhesion_length
-        values = self.adhesion_map.on_nodes(grid, side, periodic=periodic)
-        return self.adhesion_length * values / self.adhesion_map.mean
+            return 1.0
+        return self.adhesion_map.on_nodes(grid, side, periodic=periodic) / self.adhesion_map.mean
 
     @property
     def adhesion_length(self) -> float:

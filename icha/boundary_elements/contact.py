@@ -454,10 +454,10 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
     largest = float(np.abs(heights, where=np.isfinite(heights), out=np.zeros_like(heights)).max())
     attraction: AtDistance | ShortRange = NoAttraction()
     if material.surface_energy:
-        adhesion_length = material.adhesion_length_on(surface.grid, surface.period, periodic=not surface.free) / h
-        if np.ndim(adhesion_length):
-            margin = (0, space.grid - surface.grid)
-            adhesion_length = np.pad(adhesion_length, margin, constant_values=material.adhesion_length / h)
+        places = material.relative_energy(surface.grid, surface.period, periodic=not surface.free)
+        if np.ndim(places):
+            places = np.pad(places, (0, space.grid - surface.grid), constant_values=1.0)
+        adhesion_length = material.adhesion_length / h * places
         ratio = material.receding.surface_energy / material.surface_energy
         if attraction_on(material, h) == FINITE_RANGE:
             strength = material.interface_strength / material.contact_modulus * ratio**0.5
@@ -465,8 +465,7 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
         else:
             R, above = asperities.radius_of_curvature, asperities.height - heights.ravel()[cell]
             # The jump-in distance depends on the product of the square of the work and the radius.
-            local = at_cells(adhesion_length * h / material.adhesion_length, cell)
-            jump_in = law.jump_in_approach(R * local**2)
+            jump_in = law.jump_in_approach(R * at_cells(places, cell) ** 2)
             radius = law.contact_radius(jump_in, R)
             strength = material.receding.interface_strength / material.contact_modulus
             attraction = ShortRange(adhesion_length, strength, cell, above / h, -jump_in / h, radius / h, ratio)

@@ -14,7 +14,6 @@ from typing import Annotated, Any, NamedTuple
 
 from pydantic import AfterValidator, Field, PrivateAttr
 
-from icha.asperity.adhesion_map import map_of
 from icha.configuration.figures import Figures
 from icha.configuration.measurements import Measurement
 from icha.configuration.publication import Line, Prose, Publication
@@ -270,8 +269,7 @@ class Campaign(Section):
             thickness, known = self.materials[label].thickness, self._grid_and_period(name)
             if (places := self.materials[label].adhesion_map) and hasattr(known, "grid"):
                 try:
-                    field = map_of(places.model_dump(exclude_none=True))
-                    field.on_nodes(known.grid, known.period, periodic=not self.is_free(name))
+                    places.field.on_nodes(known.grid, known.period, periodic=not self.is_free(name))
                 except ValueError as error:
                     reason = f"contains {label!r}, whose work of adhesion does not fit the surface {name!r}: {error}"
                     yield ("materials",), study.materials, reason

@@ -14,7 +14,7 @@ from pydantic import (
     model_validator,
 )
 
-from icha.asperity.adhesion_map import MAPS, map_of
+from icha.asperity.adhesion_map import MAPS, Patches, Stripes, map_of
 from icha.asperity.material import VAN_DER_WAALS_RANGE
 from icha.configuration.shapes import ShapeSection
 from icha.support import formatting
@@ -119,15 +119,15 @@ class AdhesionMapSection(Section):
     """Random patches."""
 
     @property
-    def mean(self) -> float:
-        """Mean work of adhesion, J/m^2."""
-        return map_of(self.model_dump(exclude_none=True)).mean
+    def field(self) -> Stripes | Patches:
+        """The map that the section describes."""
+        return map_of(self.model_dump(exclude_none=True))
 
     @model_validator(mode="after")
     def _check(self):
         if (self.stripes is None) == (self.patches is None):
             raise ValueError("expected one of the keys stripes and patches")
-        map_of(self.model_dump(exclude_none=True))
+        _ = self.field  # raises ValueError for invalid values
         return self
 
 
@@ -239,7 +239,7 @@ class MaterialSection(Section):
         if content.get("adhesion_map") is not None:
             raise ValueError("adhesion_map: is given beside a map in surface_energy; expected one of both")
         try:
-            mean = AdhesionMapSection.model_validate(energy).mean
+            mean = AdhesionMapSection.model_validate(energy).field.mean
         except ValidationError:
             mean = 1.0  # the map reports the problem
         return {**content, "surface_energy": f"{mean!r} J/m^2", "adhesion_map": energy}

@@ -197,9 +197,9 @@ class AsperityObservables:
 def contact_of(surface: Surface, material: Material) -> InteractingAsperities:
     """Return the contact of a surface and a material.
 
-    Raises `ValueError` for a layer, for works of adhesion by direction, for a surface with a shape and for a surface
-    without summits. On a shape the model
-    is wrong: the pull-off force of a rough sphere was 0.4 times that of boundary elements.
+    Raises `ValueError` for a layer, for works of adhesion by direction or place, for a surface with a shape and for a
+    surface without summits. On a shape the model is wrong: the pull-off force of a rough sphere was 0.4 times that of
+    boundary elements.
     """
     if material.layered:
         raise ValueError(

@@ -64,8 +64,8 @@ def simulate(
     surface : rough surface, scaled to its final rms slope.
     material : contact modulus, work of adhesion, range of attraction and largest flaw of the interface.
     path : loads, areas or separations to reach; at some of these targets, spots and distributions are stored.
-    model : "asperities" or "boundary_elements". Boundary elements are slower, and use the limit of a short range
-        of attraction.
+    model : "asperities" or "boundary_elements". Boundary elements are slower; where the grid does not resolve the range
+        of attraction, they use the limit of a short range.
     seed : seed of the surface, for the record in the dataset; -1 for a surface without a seed.
     progress : function that is called with a line of text at every target, and in a long path also between targets.
         Default: messages of level INFO of the logger "icha".
