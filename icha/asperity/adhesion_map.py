@@ -5,10 +5,12 @@ from __future__ import annotations
 import hashlib
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
+from icha.support.checksums import refuse_changed
+from icha.support.input_files import RefusedFile, bounded_memory, require_room
 from icha.support.rules import LENGTH, SEED, SURFACE_ENERGY
 
 # Waves of a random field whose amplitude is below this part of the largest one are left out.
@@ -114,8 +116,18 @@ class NodeValues:
     def __post_init__(self):
         """Check the values."""
         values = np.array(self.values, dtype=float)
-        if values.ndim != 2 or not np.isfinite(values).all() or not (values > 0).all():
-            raise ValueError("surface_energy: a map must be an array (n, n) of positive works of adhesion, J/m^2")
+        if values.ndim != 2 or len(set(values.shape)) != 1 or not values.size:
+            raise ValueError(
+                f"surface_energy: the map has the shape {values.shape}; expected (n, n), a value for each node of the "
+                "surface"
+            )
+        wrong = ~np.isfinite(values) | (values <= 0)
+        if wrong.any():
+            row, column = map(int, np.argwhere(wrong)[0])
+            raise ValueError(
+                f"surface_energy: {wrong.sum()} of {wrong.size} values of the map, the first [{row}, {column}] = "
+                f"{values[row, column]:g} J/m^2; expected positive numbers. Replace these values"
+            )
         values.flags.writeable = False
         object.__setattr__(self, "values", values)
 
@@ -143,8 +155,45 @@ class NodeValues:
     def on_nodes(self, grid: int, side: float, *, periodic: bool) -> np.ndarray:
         """Return the values; raise ValueError if the surface has another number of nodes."""
         if self.values.shape != (grid, grid):
-            raise ValueError(f"surface_energy: the map has {self.values.shape} values; expected {(grid, grid)}")
+            raise ValueError(
+                f"surface_energy: the map has {self.values.shape} values; expected {(grid, grid)}, a value for each "
+                "node of the surface. Interpolate the map"
+            )
         return self.values
+
+
+@lru_cache(maxsize=4)
+def read_map(file: str, unit: float, sha256: str) -> NodeValues:
+    """Read works of adhesion on the nodes of a surface.
+
+    Parameters
+    ----------
+    file : path of a NumPy file (`.npy`) with an array (n, n); the first axis is y.
+    unit : unit of the numbers in the file, J/m^2.
+    sha256 : expected checksum of the file.
+
+    Raises
+    ------
+    ValueError
+        If the file has changed, is not a NumPy file, or has other values than positive numbers.
+    """
+    refuse_changed(file, sha256)
+    try:
+        # A mapped array cannot be larger than its file. NumPy warns of an overflow before it refuses the array.
+        with bounded_memory(), np.errstate(over="ignore"):
+            values = np.lib.format.open_memmap(file, mode="r")
+            require_room(3 * 8 * values.size)
+            if values.dtype.kind not in "iuf":
+                raise ValueError(f"{values.dtype} values")
+            return NodeValues(values * unit)
+    except RefusedFile as error:
+        raise ValueError(f"surface_energy: {error}") from None
+    except (ValueError, OSError, EOFError, SyntaxError) as error:
+        if str(error).startswith("surface_energy"):
+            raise
+        raise ValueError(
+            "surface_energy: the file is no NumPy array of numbers; expected a file `.npy` from `numpy.save`"
+        ) from None
 
 
 AdhesionMap = Stripes | Patches | NodeValues
@@ -153,9 +202,14 @@ MAPS = {"stripes": Stripes, "patches": Patches}
 
 
 def map_of(value: object) -> AdhesionMap | None:
-    """Return the map that a value describes: a map, an array, or a name in `MAPS` with its parameters; else None."""
+    """Return the map that a value describes, else None.
+
+    The value is a map, an array, a name in `MAPS` with its parameters, or a mapping of the arguments of `read_map`.
+    """
     if isinstance(value, Stripes | Patches | NodeValues):
         return value
+    if isinstance(value, dict) and "file" in value:
+        return read_map(str(value["file"]), value["unit"], value["sha256"])
     if isinstance(value, dict) and len(value) == 1 and next(iter(value)) in MAPS:
         (name, parameters), *_ = value.items()
         return MAPS[name](**parameters)

@@ -59,7 +59,11 @@ def adhesive_contacts(campaign: Campaign, surface: str) -> list[dict]:
     """Return all pairs of rms slope and adhesive material in the runs on a surface, without repetition."""
     pairs = dict.fromkeys((case.rms_slope, case.material) for case in run_cases(campaign) if case.surface == surface)
     return [
-        {"rms_slope": rms_slope, "name": name, "material": campaign.materials[name].model_dump(exclude_none=True)}
+        {
+            "rms_slope": rms_slope,
+            "name": name,
+            "material": campaign.materials[name].model_dump(exclude_none=True, exclude={"adhesion_map"}),
+        }
         for rms_slope, name in pairs
         if campaign.materials[name].surface_energy > 0
     ]
@@ -72,7 +76,9 @@ def surface_sha256(campaign: Campaign, name: str, seed: int) -> str:
 
 def run_sha256(campaign: Campaign, case: RunLabels) -> str:
     """Compute the SHA-256 of all settings and files that determine the results of a run."""
-    return _sha256([run_settings(campaign, case), *_surface_and_file(campaign, case.surface)])
+    settings = run_settings(campaign, case)
+    settings["material"].get("adhesion_map", {}).pop("file", None)  # the settings contain the checksum of the file
+    return _sha256([settings, *_surface_and_file(campaign, case.surface)])
 
 
 def theories_sha256(campaign: Campaign, surface: str, seed: int) -> str:

@@ -3,8 +3,9 @@
 import itertools
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -25,6 +26,7 @@ from icha.configuration.plausibility import (
     plausibility_problems,
     sticky_runs,
     unusual_heights,
+    unusual_maps,
     unusual_topography,
     unusual_values,
 )
@@ -95,7 +97,7 @@ def load_configuration(
 def _load(source: Source, within: str | os.PathLike | None) -> Configuration:
     """Check a configuration and the files that it names."""
     unusual = unusual_values(source.content)
-    campaign = _check_text(source, unusual)
+    campaign = _check_text(source, unusual, within)
     text, confirmed = dump_yaml(source.content, source.name), source.content.get(CONFIRMED)
     refuse(source, _files_outside(campaign, within) if within is not None else ())
     topographies, unread = inspect_topographies(campaign)
@@ -106,6 +108,7 @@ def _load(source: Source, within: str | os.PathLike | None) -> Configuration:
         unusual += unusual_topography(
             location, campaign.surfaces[name], each.period, each.rms_slope, each.repeated_height
         )
+    unusual += unusual_maps(campaign)
     unusual += unusual_heights(campaign)
     unusual += negligible_loads(campaign)
     unusual += mirrored_forces(campaign)
@@ -156,8 +159,8 @@ def _with_chosen_levels(written: dict, results: Path) -> dict:
     return merge(written, {"studies": {label: {"levels": chosen[label]} for label in asked if label in chosen}})
 
 
-def _check_text(source: Source, unusual: list[Unusual]) -> Campaign:
-    """Check the text of a configuration file and return the campaign; surfaces from files are not read.
+def _check_text(source: Source, unusual: list[Unusual], within: str | os.PathLike | None) -> Campaign:
+    """Check the text of a configuration file and return the campaign; of other files, only maps of adhesion are read.
 
     Unusual values that are not confirmed are reported first, because they may cause the other problems.
     """
@@ -165,6 +168,7 @@ def _check_text(source: Source, unusual: list[Unusual]) -> Campaign:
     content = apply_defaults(source.content)
     if excess := excessive_size(content):
         raise ConfigurationError(f"{source.name}: {excess}; expected fewer")
+    content["materials"] = _with_paths_of_maps(source, content.get("materials"), within)
     try:
         campaign = Campaign.model_validate(content)
     except ValidationError as error:
@@ -175,10 +179,41 @@ def _check_text(source: Source, unusual: list[Unusual]) -> Campaign:
     return campaign
 
 
+def _with_paths_of_maps(source: Source, materials: Any, within: str | os.PathLike | None) -> Any:
+    """Return the content of the section `materials` with complete paths of the maps of works of adhesion."""
+    folder, outside = Path(source.name).parent, []
+
+    def resolve(file, name):
+        try:
+            if within is not None and not _is_inside(folder / file, within):
+                outside.append((("materials", name), file, _OUTSIDE))
+        except ValueError:  # characters that no path contains; the check of the text reports them
+            return file
+        return str(folder / file)
+
+    if not isinstance(materials, Mapping):
+        return materials
+    resolved = {name: _with_file(each, partial(resolve, name=name)) for name, each in materials.items()}
+    refuse(source, outside)
+    return resolved
+
+
+def _with_file(material: Any, change: Callable[[str], str]) -> Any:
+    """Return the content of a material, with another path of its map of works of adhesion."""
+    if not isinstance(material, Mapping):
+        return material
+    return {
+        key: change(value) if key == "file" and isinstance(value, str) else _with_file(value, change)
+        for key, value in material.items()
+    }
+
+
 def _named_files(campaign: Campaign) -> dict[tuple[str, str], str]:
-    """Return the paths of the files of surfaces, measurements and own figures, by section and entry."""
+    """Return the paths of the files of surfaces, maps, measurements and own figures, by section and entry."""
     files = {("surfaces", name): each.path for name, each in campaign.surfaces.items() if each.from_file}
     files |= {("figures", name): each.script for name, each in campaign.figures.model_extra.items()}
+    maps = {("materials", name): each.adhesion_map for name, each in campaign.materials.items()}
+    files |= {key: each.file for key, each in maps.items() if each and each.file}
     return files | {("measurements", name): each.path for name, each in campaign.measurements.items()}
 
 
@@ -193,20 +228,25 @@ def _files_of(section: str, path: str) -> dict[str, str]:
     return {Path(path).name: path} | {file.relative_to(folder).as_posix(): str(file) for file in modules}
 
 
+# Message for a file outside the folder of the configuration.
+_OUTSIDE = "is outside the folder of the configuration; expected files in this folder"
+
+
+def _is_inside(path: str | os.PathLike, folder: str | os.PathLike) -> bool:
+    """Return whether a file is inside a folder; links are resolved first."""
+    return Path(path).resolve().is_relative_to(Path(folder).resolve())
+
+
 def _files_outside(campaign: Campaign, folder: str | os.PathLike) -> list[Problem]:
-    """Return a problem for each of a campaign's files that lies outside a folder; links are resolved first."""
+    """Return a problem for each of a campaign's files that lies outside a folder."""
     return [
-        (
-            (section, campaign.origin(section, name), _key_of_path(section)),
-            path,
-            "is outside the folder of the configuration; expected files in this folder",
-        )
+        ((section, campaign.origin(section, name), _key_of_path(section)), path, _OUTSIDE)
         for (section, name), path in _named_files(campaign).items()
-        if not Path(path).resolve().is_relative_to(Path(folder).resolve())
+        if not _is_inside(path, folder)
     ]
 
 
-# Folder for copies of the files of surfaces and measurements; a copy of the configuration is in the parent folder.
+# Folder for copies of the files that a configuration names; a copy of the configuration is in the parent folder.
 INPUTS = "inputs"
 
 
@@ -224,13 +264,19 @@ def collect_inputs(configuration: Configuration) -> tuple[str, dict[str, str]]:
     if not named:
         return configuration.text, {}
     content = yaml.safe_load(configuration.text)
+    if any(section == "materials" for section, _ in named):
+        # Defaults may contain the path of a map, which each material gets at its own place.
+        content["materials"] = apply_defaults(content)["materials"]
+        (content.get("defaults") or {}).pop("materials", None)
     surfaces = {each.surface for study in campaign.studies for each in campaign.contacts(study)}
     used = {("surfaces", campaign.origin("surfaces", name)) for name in surfaces}
     files = {}
     for (section, name), path in named.items():
         folder = PurePosixPath(INPUTS, section, name)
         stored = {str(folder / place): file for place, file in _files_of(section, path).items()}
-        content[section][name] = (content[section][name] or {}) | {_key_of_path(section): next(iter(stored))}
+        entry, first = content[section][name] or {}, next(iter(stored))
+        by_map, by_key = lambda _, first=first: first, {_key_of_path(section): first}
+        content[section][name] = _with_file(entry, by_map) if section == "materials" else entry | by_key
         if section != "surfaces" or (section, name) in used:
             files |= stored
     # Every surface from a file now has its own path, so the path is removed from the defaults.

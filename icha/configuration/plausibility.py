@@ -9,7 +9,6 @@ from collections.abc import Collection, Iterator, Mapping
 from typing import Any, NamedTuple
 
 from icha.asperity.full_contact import FULL_CONTACT_BELOW, full_contact_energy_ratio
-from icha.asperity.material import Material
 from icha.asperity.tabor import LEAST_TABOR, describe_short_range
 from icha.configuration.campaign import Campaign
 from icha.configuration.surfaces import SelfAffineSurface
@@ -100,6 +99,15 @@ def unusual_topography(
             source = f" (with {outliers}; try `outliers: remove` first)"
         key = "height_unit" if hasattr(section, "height_unit") else "length_unit"
         yield Unusual((*location, key), f"rms slope {rms_slope:.3g}", RMS_SLOPE, source)
+
+
+def unusual_maps(campaign: Campaign) -> Iterator[Unusual]:
+    """Yield the mean of each map of works of adhesion if it is unusual."""
+    for name, section in campaign.materials.items():
+        if section.adhesion_map and not USUAL["surface_energy"].contains(section.surface_energy):
+            value = formatting.format_quantity(section.surface_energy, "J/m^2")
+            location = "materials", campaign.origin("materials", name), "surface_energy"
+            yield Unusual(location, value, USUAL["surface_energy"], ", the mean of the map")
 
 
 def plausibility_problems(
@@ -218,7 +226,7 @@ def resolution_of_smooth(campaign: Campaign, study: str, contact: RunLabels) -> 
     from icha.references.limits import contact_resolution  # imports SciPy, which takes time
 
     section = campaign.surfaces[contact.surface]
-    material = Material(**campaign.materials[contact.material].model_dump(exclude_none=True))
+    material = campaign.materials[contact.material].material
     targets = campaign.studies[study].targets.states
     return contact_resolution(section.shape.shape, section.side, section.grid, material, targets)
 
@@ -233,7 +241,7 @@ def long_ranges(campaign: Campaign) -> Iterator[Unusual]:
             origin = campaign.origin("materials", contact.material)
             if value is None or value >= min(LEAST_TABOR, found.get(origin, (math.inf,))[0]):
                 continue
-            material = Material(**campaign.materials[contact.material].model_dump(exclude_none=True))
+            material = campaign.materials[contact.material].material
             spacing = campaign.period(contact.surface) / campaign.grid(contact.surface)
             if attraction_on(material, spacing) == FINITE_RANGE:
                 continue
@@ -252,7 +260,7 @@ def tabor_parameter(campaign: Campaign, contact: RunLabels) -> float | None:
     The radius is 1/(rms curvature) of the roughness; without roughness, it is the radius of the shape.
     """
     section = campaign.surfaces[contact.surface]
-    material = Material(**campaign.materials[contact.material].model_dump(exclude_none=True))
+    material = campaign.materials[contact.material].material
     radius = section.shape.shape.sphere_radius if section.smooth else 1 / rms_curvature(campaign, contact)
     return float(material.tabor_parameter(radius)) if material.surface_energy and radius else None
 

@@ -1,6 +1,8 @@
 """Sections `surfaces` and `materials`: rough surfaces, and elastic half-spaces or layers."""
 
 from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import (
@@ -10,14 +12,17 @@ from pydantic import (
     TypeAdapter,
     ValidationError,
     WithJsonSchema,
+    computed_field,
     field_validator,
     model_validator,
 )
 
-from icha.asperity.adhesion_map import MAPS, Patches, Stripes, map_of
-from icha.asperity.material import VAN_DER_WAALS_RANGE
+from icha.asperity.adhesion_map import MAPS, AdhesionMap, map_of
+from icha.asperity.material import VAN_DER_WAALS_RANGE, Material
 from icha.configuration.shapes import ShapeSection
 from icha.support import formatting
+from icha.support.checksums import sha256_of
+from icha.support.input_files import problem_with_path
 from icha.support.rules import GRID, HURST, LENGTH, POISSON_RATIO, FloatRange, IntegerRange
 from icha.support.values import (
     PATTERN,
@@ -110,29 +115,53 @@ class PatchesSection(Section):
     """Seed of the field; all runs with the material have the same field."""
 
 
+def _unit_of_energy(value: Any) -> float:
+    """Convert a unit of a work of adhesion, such as `mJ/m^2`, to J/m^2."""
+    try:
+        return to_si(f"1 {value}", "J/m^2")
+    except ValueError as error:
+        raise ValueError(f"{error}; expected a unit of a work of adhesion, such as 'mJ/m^2'") from None
+
+
 class AdhesionMapSection(Section):
-    """Works of adhesion from place to place: one of both keys. Only with `models: [boundary_elements]`."""
+    """Works of adhesion from place to place: stripes, patches, or a file. Only with `models: [boundary_elements]`."""
 
     stripes: StripesSection | None = None
     """Stripes of two works of adhesion."""
     patches: PatchesSection | None = None
     """Random patches."""
+    file: File | None = None
+    """Path of a NumPy file (`.npy`) with an array (grid, grid) of works of adhesion, one for each node of the surface,
+    relative to the configuration file. The first axis is y."""
+    unit: Annotated[float, BeforeValidator(_unit_of_energy), WithJsonSchema({"type": "string"})] | None = None
+    """Unit of the numbers in the file, such as `mJ/m^2`."""
+
+    @computed_field
+    @cached_property
+    def sha256(self) -> str | None:
+        """SHA-256 of the file; None without."""
+        return sha256_of(Path(self.file)) if self.file else None
 
     @property
-    def field(self) -> Stripes | Patches:
+    def field(self) -> AdhesionMap:
         """The map that the section describes."""
         return map_of(self.model_dump(exclude_none=True))
 
     @model_validator(mode="after")
     def _check(self):
-        if (self.stripes is None) == (self.patches is None):
-            raise ValueError("expected one of the keys stripes and patches")
+        given = self.model_fields_set
+        if len(given) != (2 if self.file else 1) or given == {"unit"} or (self.file and self.unit is None):
+            raise ValueError(f"has {', '.join(sorted(given)) or 'no keys'}; expected {_ONE_MAP}")
+        if self.file and (problem := problem_with_path(self.file)):
+            raise ValueError(f"{self.file!r} {problem}; expected a NumPy file (`.npy`). Correct the path")
         _ = self.field  # raises ValueError for invalid values
         return self
 
 
 # Works of adhesion by direction and place.
-_MAP = {"type": "object", "minProperties": 1, "maxProperties": 1, "propertyNames": {"enum": list(MAPS)}}
+_ONE_MAP = f"one of the keys {', '.join(MAPS)}, or the keys file and unit"
+_KEYS_OF_MAP = (*([name] for name in MAPS), ["file", "unit"])
+_MAP = {"type": "object", "oneOf": [{"required": keys, "maxProperties": len(keys)} for keys in _KEYS_OF_MAP]}
 _DIRECTIONS = {
     "type": "object",
     "required": ["advancing", "receding"],
@@ -166,8 +195,9 @@ class MaterialSection(Section):
     surface_energy: Annotated[SurfaceEnergy, OrSchema({"anyOf": [_DIRECTIONS, _MAP]})]
     """Work of adhesion Δγ. The value `0 J/m^2` means no adhesion. With `{advancing: 30 mJ/m^2, receding: 90 mJ/m^2}`,
     the edge of a contact advances at a smaller work of adhesion than it recedes, and stands in between. With
-    `{stripes: …}` or `{patches: …}`, it differs from place to place: see `adhesion_map`. The advancing value may be
-    such a map; the receding one is then a mean."""
+    `{stripes: …}`, `{patches: …}` or `{file: map.npy, unit: mJ/m^2}`, it differs from place to place: see
+    `adhesion_map`. The advancing value may be such a map; the receding one is then a mean, and both have the same
+    factors from place to place."""
     receding_energy: SurfaceEnergy | None = None
     """Work of adhesion of a receding edge, for studies that vary it; `surface_energy` with two values sets it. Only
     with `models: [boundary_elements]`. Default: that of an advancing edge."""
@@ -187,6 +217,11 @@ class MaterialSection(Section):
     poisson_ratio: number(POISSON_RATIO) | None = None
     """Poisson ratio of the layer or of the body with `youngs_modulus`, from 0 to 0.5; rubber has nearly 0.5. Required
     with `thickness`. A half-space with a given E* does not depend on this ratio."""
+
+    @property
+    def material(self) -> Material:
+        """The material that the section describes."""
+        return Material(**self.model_dump(exclude_none=True))
 
     @property
     def reads_poisson_ratio(self) -> bool:
@@ -230,11 +265,10 @@ class MaterialSection(Section):
             energy = energy["advancing"]
         if not isinstance(energy, Mapping):
             return content
-        if len(energy) != 1 or next(iter(energy)) not in MAPS:
+        if not {*MAPS, "file"}.intersection(energy):
             keys = ", ".join(map(str, energy)) or "no keys"
             raise ValueError(
-                f"surface_energy: has {keys}; expected one value, the keys advancing and receding, or one of the keys "
-                f"{' and '.join(MAPS)}"
+                f"surface_energy: has {keys}; expected one value, the keys advancing and receding, or {_ONE_MAP}"
             )
         if content.get("adhesion_map") is not None:
             raise ValueError("adhesion_map: is given beside a map in surface_energy; expected one of both")

@@ -22,7 +22,7 @@ from icha.analysis.validity import (
     statements,
 )
 from icha.asperity.full_contact import gaussian_complete_pressure
-from icha.asperity.material import VAN_DER_WAALS_RANGE, WU_HOLDS_FROM, Material
+from icha.asperity.material import VAN_DER_WAALS_RANGE, WU_HOLDS_FROM
 from icha.asperity.stickiness import stickiness, sticky_rms_height
 from icha.asperity.tabor import describe_short_range
 from icha.configuration.campaign import Campaign
@@ -106,7 +106,7 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
         """Return strength, largest tension that the grid resolves, and spacing, of boundary elements."""
         if not MODELS[case.model].by_cells:
             return {}
-        material = Material(**campaign.materials[case.material].model_dump(exclude_none=True))
+        material = campaign.materials[case.material].material
         spacing = campaign.period(case.surface) / campaign.grid(case.surface)
         tension = straight_strength(material.receding.adhesion_length / spacing) * material.contact_modulus
         return {STRENGTH: material.receding.interface_strength, RESOLVED: tension, SPACING: spacing}
@@ -123,7 +123,7 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
             cases.append(Case(case.model, case.surface, case.material, known, resolution))
             continue
         facts, by_summits = facts_of(case.surface), MODELS[case.model].by_summits
-        material = Material(**campaign.materials[case.material].model_dump(exclude_none=True))
+        material = campaign.materials[case.material].material
         # Only the asperity model needs surfaces that are similar to the surfaces of its validation.
         known = (facts if by_summits else {}) | {
             "full_contact_energy_ratio": energy_ratio(campaign, case),

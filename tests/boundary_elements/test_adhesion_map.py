@@ -73,8 +73,9 @@ def test_the_energy_of_a_state_is_right_to_its_slope():
     ("energy", "message"),
     [
         (lambda: Stripes(0.05, 0.01, 1e-5), "expected 0 < low < high"),
-        (lambda: np.zeros((GRID, GRID)), "map must be an array"),
-        (lambda: np.ones((GRID, 3)), "expected \\(48, 48\\)"),
+        (lambda: np.zeros((GRID, GRID)), r"2304 of 2304 values of the map, the first \[0, 0\] = 0 J/m\^2"),
+        (lambda: np.ones((GRID, 3)), r"the shape \(48, 3\); expected \(n, n\)"),
+        (lambda: np.ones((3, 3)), r"expected \(48, 48\), a value for each node of the surface"),
         (lambda: Patches(0.03, 0.01, 1e-6), "correlation_length: 1e-06 m; expected two grid cells"),
     ],
 )

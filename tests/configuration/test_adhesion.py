@@ -1,14 +1,22 @@
 """Works of adhesion by direction and place in a configuration."""
 
+import numpy as np
 import pytest
+import xarray as xr
+import yaml
+from demo_configuration import GOOD
 
 import icha
-from icha.configuration.cases import run_cases, run_settings
+from icha.configuration.cases import campaign_sha256, run_cases, run_settings
+from icha.configuration.errors import ConfigurationError
+from icha.configuration.load import collect_inputs, load_configuration
 
 ENERGY = "materials.soft.surface_energy"
 BY_CELLS = {"studies.one.models": ["boundary_elements"]}
 PATCHES = {"mean": "30 mJ/m^2", "standard_deviation": "10 mJ/m^2", "correlation_length": "10 um", "seed": 3}
 STRIPES = {"low": "10 mJ/m^2", "high": "50 mJ/m^2", "width": "5 um"}
+FILE = {"file": "map.npy", "unit": "mJ/m^2"}
+MAP = np.random.default_rng(1).uniform(10, 50, (80, 80))
 
 
 def material_of(campaign):
@@ -43,3 +51,69 @@ def test_works_of_adhesion_that_do_not_fit_are_refused(refused, energy, message)
 def test_asperities_have_one_work_of_adhesion(refused):
     for energy in ({"advancing": "30 mJ/m^2", "receding": "90 mJ/m^2"}, {"stripes": STRIPES}):
         refused("", {ENERGY: energy}, "'asperities' have one work of adhesion, but 'soft' has several")
+
+
+@pytest.mark.parametrize("direction", [False, True])
+def test_a_map_in_a_file_is_the_array_in_python(load, tmp_path, direction):
+    np.save(tmp_path / "map.npy", MAP)
+    energy = {"advancing": FILE, "receding": "90 mJ/m^2"} if direction else FILE
+    found = material_of(load(BY_CELLS | {ENERGY: energy}).campaign)
+    array = MAP * 1e-3
+    material = icha.Material(25e6, (array, 0.09) if direction else array, 2.071e-9)
+    assert found == material
+    surface = icha.SelfAffineSpectrum(1e-4, 2e-5, 1e-5, 0.8, 0.2).realise(80, 1)
+    path = icha.Path(reduced_pressures=[0.01], unload=direction)
+    runs = [icha.simulate(surface, each, path, model="boundary_elements", seed=1) for each in (found, material)]
+    xr.testing.assert_identical(*runs)
+
+
+def test_a_map_belongs_to_the_identity_and_to_the_inputs_of_a_campaign(load, tmp_path):
+    np.save(tmp_path / "map.npy", MAP)
+    asked = load(BY_CELLS | {"defaults": {"materials": {"surface_energy": FILE}}, ENERGY: None})
+    text, files = collect_inputs(asked)
+    place = "inputs/materials/soft/map.npy"
+    assert files == {place: str(tmp_path / "map.npy")} and "map.npy" in text and str(tmp_path) not in text
+    # The copy gives the same results at another place, and another map gives other ones.
+    copy = tmp_path / "copy"
+    (copy / place).parent.mkdir(parents=True)
+    (copy / "campaign.yaml").write_text(text)
+    np.save(copy / place, MAP)
+    again = load_configuration(copy / "campaign.yaml", within=copy)
+    assert campaign_sha256(again.campaign) == campaign_sha256(asked.campaign)
+    assert collect_inputs(again)[0] == text
+    np.save(copy / place, MAP + 1)
+    other = load_configuration(copy / "campaign.yaml", within=copy)
+    assert campaign_sha256(other.campaign) != campaign_sha256(asked.campaign)
+
+
+@pytest.mark.parametrize(
+    ("energy", "values", "message"),
+    [
+        (FILE, MAP[:40, :40], "(40, 40) values; expected (80, 80), a value for each node"),
+        (FILE, MAP[:40], "the shape (40, 80); expected (n, n)"),
+        (FILE, np.where(MAP < 11, np.nan, MAP), "= nan J/m^2; expected positive numbers. Replace"),
+        (FILE, MAP - 30, "J/m^2; expected positive numbers. Replace"),
+        (FILE, MAP * 1j, "the file is no NumPy array of numbers; expected a file `.npy`"),
+        (FILE, np.full(3, None), "the file is no NumPy array of numbers; expected a file `.npy`"),
+        (FILE, None, "map.npy' no such file; expected a NumPy file"),
+        (FILE | {"unit": "J/m^2"}, MAP, ", the mean of the map; expected 0 or 0.001 mJ/m^2 to 3 J/m^2"),
+        (FILE | {"unit": "mN"}, MAP, "expected a unit of a work of adhesion, such as 'mJ/m^2'"),
+        ({"file": "map.npy"}, MAP, "has file; expected one of the keys stripes, patches, or the keys file and unit"),
+        (FILE | {"stripes": STRIPES}, MAP, "has file, stripes, unit; expected one of the keys"),
+        ({"unit": "mJ/m^2"}, MAP, "surface_energy: has unit; expected one value"),
+        (FILE | {"file": "a\0b"}, MAP, "contains the control character"),
+    ],
+)
+def test_maps_that_do_not_fit_are_refused(refused, tmp_path, energy, values, message):
+    if values is not None:
+        np.save(tmp_path / "map.npy", values)
+    refused("", BY_CELLS | {ENERGY: energy}, message)
+
+
+def test_a_map_outside_of_the_folder_is_not_read(tmp_path):
+    content = yaml.safe_load(GOOD)
+    content["studies"]["one"]["models"] = ["boundary_elements"]
+    content["materials"]["soft"]["surface_energy"] = {"file": "../map.npy", "unit": "mJ/m^2"}
+    (tmp_path / "campaign.yaml").write_text(yaml.safe_dump(content))
+    with pytest.raises(ConfigurationError, match=r"'\.\./map\.npy' is outside the folder of the configuration"):
+        load_configuration(tmp_path / "campaign.yaml", within=tmp_path)
