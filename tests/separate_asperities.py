@@ -137,6 +137,7 @@ class Asperities:
         largest = 1.5 * np.pi * self.material.surface_energy * COUNT * self.radius_of_curvature / PERIOD**2
         per_run = {
             **get_values(self.material, *MATERIAL),
+            "receding_energy": self.material.surface_energy,
             "rms_slope": self.rms_slope,
             "rms_height": self.rms_height,
             "rms_curvature": 1 / self.radius_of_curvature,

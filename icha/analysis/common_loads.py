@@ -114,7 +114,8 @@ def compare_runs(study: xr.Dataset) -> xr.Dataset:
             variables[name + suffix] = make_variable(along, values)
     described = combine_attributes(
         f"Comparison of the runs of study {study.attrs.get('study', '')}".rstrip(),
-        "Contact area and mean separation of all runs at common loads, by monotone interpolation.",
+        "Contact area and mean separation of all runs at common loads. Monotone cubic polynomials (PCHIP) of the "
+        "logarithm of the load interpolate the logarithm of the area, and the separation.",
         DERIVED,
         [study.attrs],
     )

@@ -46,8 +46,8 @@ COMPLETE, STRENGTH, THEORETICAL = "complete_contact_pressure", "interface_streng
 RESOLVED, SPACING = "resolved_tension", "spacing"
 TABOR = "tabor_parameter"
 RMS_HEIGHT, STICKY_HEIGHT = "rms_height", "sticky_rms_height"
-# 1 for a surface with a shape, otherwise 0.
-SHAPED = "shaped"
+# 1 for a surface with a shape, otherwise 0. Ratio of the works of adhesion of receding and advancing edges.
+SHAPED, DIRECTION = "shaped", "direction"
 _OF_FULL_CONTACT = (COMPLETE, STRENGTH, THEORETICAL, RESOLVED)
 
 # ICHA warns if more than this fraction of the single-asperity spots is outside the range of Wu's formula.
@@ -177,17 +177,18 @@ def _full_contact(cases):
     if not adhesive:
         return
     lowest = min(adhesive, key=lambda case: case.ratio)
+    receding = lowest.ratio / lowest.facts.get(DIRECTION, 1.0)
     text = (
-        f"{expected_behaviour(lowest.ratio)}; U_full/dgamma is about {lowest.ratio:.3g} or more "
+        f"{expected_behaviour(lowest.ratio, receding)}; U_full/dgamma is about {lowest.ratio:.3g} or more "
         f"({lowest.material} on {lowest.surface}); {MEANING}"
     )
     if COMPLETE in lowest.facts:
         pressures = lowest.facts[COMPLETE], lowest.facts[COMPLETE] - lowest.facts[STRENGTH], lowest.facts[STRENGTH]
-        complete, opening, strength = (format_quantity(pressure, "Pa") for pressure in pressures)
+        complete, opening, strength = (format_quantity(float(f"{pressure:.2g}"), "Pa") for pressure in pressures)
         if lowest.facts[STRENGTH] < lowest.facts[THEORETICAL]:
             strength += f" with its flaw, {format_quantity(lowest.facts[THEORETICAL], 'Pa')} without the flaw"
         text += (
-            f"; contact is complete at about {complete} without adhesion; full contact opens at the pressure {opening} "
+            f"; contact is complete at about {complete} without adhesion; full contact opens at about {opening} "
             f"(strength of the interface: {strength}){_unresolved_strength(lowest.facts)}"
         )
     if STICKY_HEIGHT in lowest.facts:
@@ -201,7 +202,7 @@ def _full_contact(cases):
         text += f"; the asperity model is applicable up to the contact area A/A0 = {limit:.2g}"
     if any(case.facts.get(SHAPED) for case in cases):
         text += "; surfaces with a shape are left out"
-    yield Statement("adhesion", text, lowest.ratio >= HIGH_PULL_OFF_BELOW and limit >= MAX_AREA_FRACTION)
+    yield Statement("adhesion", text, receding >= HIGH_PULL_OFF_BELOW and limit >= MAX_AREA_FRACTION)
 
 
 def _unresolved_strength(facts):

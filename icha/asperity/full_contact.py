@@ -11,7 +11,7 @@ import math
 FULL_CONTACT_BELOW, HIGH_PULL_OFF_BELOW = 1.0, 2.0
 MEANING = (
     f"below {FULL_CONTACT_BELOW:g}, full contact has a lower energy than separated surfaces; below about "
-    f"{HIGH_PULL_OFF_BELOW:g}, a high pull-off tension is expected"
+    f"{HIGH_PULL_OFF_BELOW:g}, a high pull-off tension is expected; dgamma is that of advancing edges"
 )
 
 
@@ -34,10 +34,10 @@ def gaussian_complete_pressure(waves: float) -> float:
     return math.sqrt(2 * math.log(2 * math.pi * waves**2)) / 2
 
 
-def expected_behaviour(energy_ratio: float) -> str:
-    """Return a text that describes how a surface with this ratio U_full/dgamma behaves."""
+def expected_behaviour(energy_ratio: float, receding_ratio: float) -> str:
+    """Return a text that describes how a surface behaves, with the ratios U_full/dgamma of both works of adhesion."""
     if energy_ratio < FULL_CONTACT_BELOW:
         return "sticky: adhesion closes most of the contact, and the strength of the interface decides the pull-off"
-    if energy_ratio < HIGH_PULL_OFF_BELOW:
+    if receding_ratio < HIGH_PULL_OFF_BELOW:
         return "nearly sticky: high pull-off is expected"
     return "closes under load only"

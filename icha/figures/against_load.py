@@ -43,9 +43,9 @@ _COMPARED_IN = (
     (Panel("reduced_pressure", "reduced_separation"), "separation_error"),
 )
 
-_COMPARED = """Panels (c) and (d) show the relative difference between asperity model and boundary elements (BEM), on
-the same topographies at the same loads; thin lines join the symbols, which end at the largest load that both models
-reach."""
+_COMPARED = """Panels (c) and (d) show the relative difference between asperity model and boundary elements (BEM), of
+each topography at the same load, as a mean over the seeds; thin lines join the symbols, which end at the largest load
+that both models reach."""
 _CIAVARELLA = """Lines with two dots show the estimate of Ciavarella (2018) in place of the asperity model; it follows
 from boundary elements without adhesion, and its loads are not those of the symbols."""
 _PERSSON = "Other lines are theories of contact without adhesion: that of Persson for the area (a)."

@@ -345,6 +345,11 @@ _LOSS_SPAN = 30.0
 _LEAST_SHARE = 1e-6
 # Variables along x and y.
 _LOSS = ("largest_contact_area_fraction", "hysteresis_loss_over_surface_energy")
+# What negative parts are.
+_GAINS = {
+    "loss_by_coalescence": "Negative parts by coalescence are energy gained when spots unite or separate.",
+    "loss_unattributed": "A negative unattributed part is an error of steps or of interactions without reciprocity.",
+}
 # Opacity of the bars of runs to which the model is not applicable.
 _PALE = 0.35
 
@@ -390,17 +395,18 @@ def loss(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
         handles |= {name: model_handle(name, **look) for name, look in names.items()}
     else:
         left.set_title(", ".join(models), loc="right")
-    shown = _draw_parts(right, lines, looks)
     say(
         fig,
         """Panel (b) shows the causes of the loss at the largest load of every series of panel (a), with the marker of
-        the series below the bar.""",
-        "The causes are those of the asperity model." if truths else "",
-        """Negative parts are energy gained when spots unite or separate. Each part is divided by the sum of the
-        magnitudes of all parts.""",
-        "The unattributed loss has none of these causes." if "loss_unattributed" in shown else "",
-        grid_of_loops(campaign, studies),
+        the series below the bar. Each part is divided by the sum of the magnitudes of all parts.""",
+        "Where the asperity model has the same series as boundary elements, the causes are those of the asperity model."
+        if truths
+        else "",
     )
+    compared = {contact for contact, *_ in lines}
+    alone = {key: line for key, line in truths.items() if key[0] not in compared}
+    shown = _draw_parts(right, lines | alone, {key: _look_of_loss(looks, key, truths) for key in runs}, looks)
+    say(fig, grid_of_loops(campaign, studies))
     handles |= {label_of(name): Patch(ec="black", lw=0.5, **PARTS[name]) for name in shown}
     legend_below(fig, handles, looks.heading(), rows=looks.slopes_per_surface)
     return fig
@@ -411,12 +417,11 @@ def _draw_losses(ax, runs, truths, looks):
     drawn = {key: Points(line, *_LOSS) for key, line in (runs | truths).items()}
     handles = looks.handles(ls="none") if looks.many else {}
     for key, line in drawn.items():
-        contact, applicable, model = key
-        if key in truths:
-            line.draw(ax, looks.cross(contact, applicable=applicable))
-            continue
-        handle = line.draw(ax, looks.look(contact, applicable=applicable, model=model) | {"ls": "none"})
-        if not applicable:
+        contact, applicable, _ = key
+        handle = line.draw(ax, _look_of_loss(looks, key, truths))
+        if key in truths and not looks.many:
+            handles.setdefault(looks.name(contact), handle)
+        if key in truths or not applicable:
             continue
         (x, y), words = line.means, ""
         if line.same_seeds and len(np.unique(x)) >= _LEAST_POINTS:
@@ -434,6 +439,14 @@ def _draw_losses(ax, runs, truths, looks):
     ax.axhline(0, color=GREY, lw=0.6, zorder=1)
     ax.set(xlabel=label_of(_LOSS[0]), ylabel=label_of(_LOSS[1]))
     return handles
+
+
+def _look_of_loss(looks, key, truths):
+    """Return the look of the markers of a series: crosses of boundary elements beside another model."""
+    contact, applicable, model = key
+    if key in truths:
+        return looks.cross(contact, applicable=applicable)
+    return looks.look(contact, applicable=applicable, model=model) | {"ls": "none"}
 
 
 def fit_line(x: np.ndarray, y: np.ndarray, along: np.ndarray) -> tuple[np.ndarray, float, float]:
@@ -458,12 +471,15 @@ def shares(line: Sequence[ContactRuns]) -> dict[str, float]:
     return dict(zip(PARTS, parts / total if total > 0 else parts, strict=True))
 
 
-def _draw_parts(ax, runs, looks):
-    """Draw the parts of the loss of every line as a stacked bar; return the names of the drawn parts."""
+def _draw_parts(ax, runs, markers, looks):
+    """Draw the parts of the loss of every line as a stacked bar; return the names of the drawn parts.
+
+    markers : look of the marker of each line.
+    """
     bars = {key: shares(line) for key, line in runs.items()}
     shown = [name for name in PARTS if any(abs(bar[name]) >= _LEAST_SHARE for bar in bars.values())]
-    for position, ((contact, applicable, model), bar) in enumerate(bars.items()):
-        above, below = 0.0, 0.0
+    for position, (key, bar) in enumerate(bars.items()):
+        (contact, applicable, model), above, below = key, 0.0, 0.0
         for name in shown:
             share = 100 * bar[name]
             part = Name(label_of(name), RunLabels(None, model, contact[1], None, contact[2], contact[0]))
@@ -471,8 +487,9 @@ def _draw_parts(ax, runs, looks):
             bar_look = {"ec": "black", "lw": 0.4, "alpha": None if applicable else _PALE} | PARTS[name]
             ax.bar(position, share, 0.8, bottom=above if share > 0 else below, **bar_look)
             above, below = above + max(share, 0), below + min(share, 0)
-        look = looks.look(contact, applicable=applicable, model=model)
-        ax.plot(position, -0.055, transform=ax.get_xaxis_transform(), clip_on=False, **look | {"ls": "none"})
+            say(ax, _GAINS.get(name, "") if share < -100 * _LEAST_SHARE else "")
+        ax.plot(position, -0.055, transform=ax.get_xaxis_transform(), clip_on=False, **markers[key])
+    say(ax, "The unattributed loss has none of these causes." if "loss_unattributed" in shown else "")
     ax.axhline(0, color="black", lw=0.6)
     ax.set(xlim=(-0.7, len(bars) - 0.3), ylabel="share of losses and gains (%)")
     ax.set_xticks(range(len(bars)), [looks.place_name(tuple(place)) for (_, *place), *_ in bars], rotation=90)

@@ -23,7 +23,7 @@ from icha.figures.looks import (
     legend_below,
     model_handle,
 )
-from icha.figures.select import has_layer, has_shape, select_snapshots, snapshot_label
+from icha.figures.select import NothingToDraw, has_layer, has_shape, select_snapshots, snapshot_label
 from icha.figures.style import BLACK, GREY, TWO_COLUMNS, in_style, logarithmic_axes, new_panels, slope_label
 from icha.support.formatting import choose_unit
 from icha.support.statistics import ENOUGH
@@ -267,6 +267,8 @@ def patch_sizes(campaign: xr.DataTree, *, study: str, kind: str | None = None, t
         tuple([patch_areas(run, at) * factor**2 for run, at in members] for members in (line.members, line.truths))
         for line in lines
     ]
+    if max(area.size for each, _ in areas for area in each) < 2:
+        raise NothingToDraw(f"study {study}: every snapshot has at most one contact patch; the figure needs several")
     # Without enough patches for a density, the figure has only the second panel, whose lines have no markers.
     dense = max(len(patch_density(each, cell)[0]) for each, _ in areas) >= _FEWEST_BINS
     fig, [panels] = new_panels(3.1, columns=1 + dense, width=TWO_COLUMNS if dense else _ALONE, sharex=True)

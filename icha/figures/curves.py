@@ -31,7 +31,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-_COMMON = "Means are at common loads, interpolated between the computed states of each seed."
+_COMMON = """Means are at common loads. Between the computed states of each seed, monotone cubic polynomials of the
+logarithm of the load interpolate."""
 _UNLOADING = {"ls": BRANCH_DASHES["unloading"], "lw": 0.7, "zorder": 2.2}
 # A value counts as a rounding error if it is at most this fraction of the largest value.
 _ROUNDING = 1e-7
@@ -206,7 +207,8 @@ def limit_ratios(axes: Axes, ratios: np.ndarray) -> None:
         axes.set_ylim(0.7 * low, 1.4 * high)
     else:
         axes.set_yscale("linear")
-        axes.set_ylim(low - 0.25 * (high - low), high + 0.15 * (high - low))
+        room = high - low or high
+        axes.set_ylim(low - 0.25 * room, high + 0.15 * room)
 
 
 # Largest ratio of the ends of a linear axis of area over load.

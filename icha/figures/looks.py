@@ -286,12 +286,13 @@ def material_colours(campaign: xr.DataTree) -> dict[str, str]:
 
 
 def pale(look: dict, model: str) -> dict:
-    """Return a look with open markers in a lighter colour, for runs to which a model is not applicable."""
+    """Return a look in a lighter colour, for runs to which a model is not applicable; open markers stay open."""
     from matplotlib.colors import to_hex, to_rgb
 
     colour = to_hex([1 - _PALENESS * (1 - part) for part in to_rgb(look["color"])])
     label = COARSE_GRID if model == REFERENCE_MODEL else NOT_APPLICABLE
-    return look | {"color": colour, "mec": colour, "mfc": "white", "label": label}
+    filling = {"mfc": colour} if look.get("mfc") == look["color"] else {}
+    return look | {"color": colour, "mec": colour, "label": label} | filling
 
 
 def graded_colours(count: int, name: str = "viridis", brightest: float = 0.9) -> list[str]:

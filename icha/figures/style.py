@@ -182,20 +182,29 @@ def format_number(value: float) -> str:
 
 
 # Variables that distinguish materials.
-INTERFACE = ["contact_modulus", "surface_energy", "interaction_range"]
+INTERFACE = ["contact_modulus", "surface_energy", "receding_energy", "interaction_range"]
+
+# Symbol and unit of each variable in the label of a material.
+_LABELS = (
+    ("contact_modulus", r"$E^{\ast}$", "Pa"),
+    ("surface_energy", r"$\Delta\gamma$", "J/m²"),
+    ("receding_energy", "receding", "J/m²"),
+)
 
 
 def material_label(study: xr.Dataset, material: str) -> str:
     """Return a legend text with the modulus and the surface energy of a material, in the same units for a whole study.
 
-    The range of attraction is added if two materials of the study have the same modulus and surface energy.
+    The work of adhesion of receding edges is added if it differs from the surface energy, and the range of attraction
+    if two materials of the study are otherwise the same.
     """
     values = study.sel(material=material)
     words, alike = [], True
-    for name, symbol, unit in (("contact_modulus", r"$E^{\ast}$", "Pa"), ("surface_energy", r"$\Delta\gamma$", "J/m²")):
+    for name, symbol, unit in _LABELS:
         value = float(values[name])
         factor, prefixed = choose_unit(float(study[name].max()), unit)
-        words.append(f"{symbol} = {value * factor:.4g} {prefixed}" if value > 0 else f"{symbol} = 0")
+        if name != "receding_energy" or value != values["surface_energy"]:
+            words.append(f"{symbol} = {value * factor:.4g} {prefixed}" if value > 0 else f"{symbol} = 0")
         alike &= study[name] == values[name]
     if int(alike.sum()) > 1:
         words.append(f"range {format_quantity(float(values['interaction_range']), 'm')}")

@@ -6,6 +6,7 @@ from functools import cache
 from icha.analysis.grid_error import length_in_cells
 from icha.analysis.validity import (
     COMPLETE,
+    DIRECTION,
     RESOLVED,
     RMS_HEIGHT,
     SHAPED,
@@ -127,6 +128,7 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
         # Only the asperity model needs surfaces that are similar to the surfaces of its validation.
         known = (facts if by_summits else {}) | {
             "full_contact_energy_ratio": energy_ratio(campaign, case),
+            DIRECTION: material.receding.surface_energy / material.surface_energy if material.surface_energy else 1.0,
             SHAPED: float(campaign.surfaces[case.surface].shape is not None),
             COMPLETE: facts[COMPLETE] * case.rms_slope * material.contact_modulus,
             STRENGTH: material.receding.interface_strength,

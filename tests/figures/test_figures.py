@@ -534,7 +534,8 @@ def many(surfaces=9, materials=1):
     kinds = ["soft"] if materials == 1 else [f"soft-surface_energy{k}mJ" for k in range(materials)]
     runs = []
     for name, (k, kind) in itertools.product(names, enumerate(kinds)):
-        run = small.run().assign(surface_energy=small.run()["surface_energy"] * (1 + 0.1 * k))
+        energy = small.run()["surface_energy"] * (1 + 0.1 * k)
+        run = small.run().assign(surface_energy=energy, receding_energy=energy)
         runs.append((RunLabels("many", "asperities", name, 1, 1.0, kind), run))
     return campaign_tree(runs)
 

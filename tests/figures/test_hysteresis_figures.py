@@ -259,6 +259,17 @@ def test_fig15_fits_nothing_through_two_loads_or_other_seeds(tree):
     assert np.count_nonzero(np.isfinite(figure.axes[0].containers[0][0].get_xdata())) == 3
 
 
+def test_fig15_has_bar_and_legend_entry_for_a_series_that_only_boundary_elements_have():
+    runs = separate.study("one", materials=("sticky",), slopes=(0.5,))
+    others = separate.study("two", materials=("sticky",), slopes=(0.25,))
+    tree = separate.tree(runs, [(labels._replace(model=REFERENCE_MODEL), run) for labels, run in others])
+    figure = against_parameter.loss(tree, studies=["one", "two"])
+    markers = [line for line in figure.axes[1].get_lines() if len(line.get_xdata()) == 1]
+    assert [line.get_marker() for line in markers] == ["o", figure.axes[0].containers[1][0].get_marker()]
+    assert {float(bar.get_x() + bar.get_width() / 2) for bar in figure.axes[1].patches} == {0.0, 1.0}
+    assert all(any(f"= {slope}" in name for name in legend(figure)) for slope in ("0.5", "0.25"))
+
+
 def points(*runs):
     """A line of points, from x and y of every seed."""
     return Points(
@@ -291,6 +302,7 @@ def test_fig15_parts_are_of_either_sign_and_make_up_the_whole(tree):
     heights = sorted((bar.get_y(), bar.get_y() + bar.get_height()) for bar in figure.axes[1].patches)
     np.testing.assert_allclose(heights, [(0, -20), (0, 60), (60, 80)])
     assert {"jump-in", "jump-off", "coalescence"} <= set(legend(figure))
+    assert "parts by coalescence are energy gained" in caption_of(figure) and "unattributed" not in caption_of(figure)
     assert not {"unattributed", "jumps at constant load"} & set(legend(figure))
 
     # Of the exact loops everything is explained by jumps, at the largest load of every line.
@@ -402,3 +414,11 @@ def test_runs_in_contact_at_the_end_have_no_pull_off_and_no_loss(module):
     with pytest.raises(ValueError, match="one: no run was unloaded to complete separation"):
         draw(module, partial, "one")
     assert len(curves(loops.loops(partial, study="one").axes[0])[1]) == 1
+
+
+def test_legends_name_both_works_of_adhesion():
+    energy = separate.run("sticky", 0.5)["surface_energy"]
+    figure = loops.loops(one(receding_energy=3 * energy), study="one")
+    works = rf"$\Delta\gamma$ = {float(energy) * 1e3:g} mJ/m², receding = {float(energy) * 3e3:g} mJ/m²"
+    assert any(works in name for name in legend(figure))
+    assert not any("receding" in name for name in legend(loops.loops(one(), study="one")))

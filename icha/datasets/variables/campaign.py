@@ -48,7 +48,9 @@ _TOPOGRAPHY = ("surface", "seed", "rms_slope")
 # For each variable of the runs: the labels that change its value. Variables not listed here depend on all five labels.
 # Runs of a study have the same snapshot targets. Bins are fixed in units of h_rms (gap) and of E* h'_rms (pressure).
 VARIES_WITH = {
-    **dict.fromkeys(("contact_modulus", "surface_energy", "interaction_range", "flaw_radius"), ("material",)),
+    **dict.fromkeys(
+        ("contact_modulus", "surface_energy", "receding_energy", "interaction_range", "flaw_radius"), ("material",)
+    ),
     **dict.fromkeys(("theoretical_strength", "interface_strength", "layer_thickness"), ("material",)),
     **dict.fromkeys(("rms_height", "rms_curvature", "unit_height", "unit_slope", "nayak_parameter"), _TOPOGRAPHY),
     **dict.fromkeys(("spectral_moment_0", "spectral_moment_2", "spectral_moment_4"), _TOPOGRAPHY),
