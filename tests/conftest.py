@@ -14,6 +14,8 @@ from pathlib import Path
 
 # Each worker process of pytest-xdist takes one core. Libraries read the variable when they are imported.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+# Each job of a workflow is a process of its own, which would otherwise compile all modules.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 import pytest
 from hypothesis import settings
@@ -76,9 +78,8 @@ def pytest_collection_modifyitems(items):
 
 def snakemake_command(*arguments, configuration=SMOKE):
     """Return command and environment of a call of Snakemake in a copy of the project."""
-    environment = os.environ | {"PYTHONDONTWRITEBYTECODE": "1"}
     chosen = ["--configfile", str(configuration)] if configuration else []
-    return [sys.executable, "-m", "snakemake", *arguments, *chosen], environment
+    return [sys.executable, "-m", "snakemake", *arguments, *chosen], dict(os.environ)
 
 
 def snakemake(project, *arguments, configuration=SMOKE, **variables):

@@ -28,7 +28,7 @@ MANY = ("runs", "--", "--forceall", "--config", "studies={load: {seeds: 1..200}}
 
 def start(project, *arguments, campaign="tiny", **settings):
     program = [sys.executable, "-c", "from icha.cli import main; main()", "run", campaign, *arguments]
-    environment = os.environ | {"PYTHONPATH": str(project), "PYTHONDONTWRITEBYTECODE": "1"}
+    environment = os.environ | {"PYTHONPATH": str(project)}
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
     return subprocess.Popen(program, cwd=project, env=environment, **pipes, **settings)
 

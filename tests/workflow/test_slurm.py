@@ -36,7 +36,7 @@ def call_with_profile(node, project):
         [PYTHON, "-m", "snakemake", "--workflow-profile", "slurm", "--configfile", CONFIGURATION,
          "--slurm-init-seconds-before-status-checks", "1"],
         cwd=project,
-        env=node.environment | {"PYTHONPATH": str(project), "PYTHONDONTWRITEBYTECODE": "1"},
+        env=node.environment | {"PYTHONPATH": str(project)},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
