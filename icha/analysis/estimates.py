@@ -138,6 +138,8 @@ def _estimate(quantity, mean, share_inputs, has_interval):
     low, high = mean.interval(half_width, signed=quantity in SIGNED)
     if quantity == "contact_area_fraction":
         high = min(high, 1.0)
+    if quantity == "spot_count":  # all runs have a patch if their mean is at least 1
+        low = max(low, min(mean.value, 1.0))
     return {
         "estimate": mean.value,
         "estimate_low": low if has_interval else math.nan,

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from icha.contact.models import REFERENCE_MODEL
-from icha.path.targets import ESTIMATED_OF_LOOPS
+from icha.path.targets import ESTIMATED_OF_LOOPS, OF_SQUARES
 from icha.support.formatting import join_first
 
 if TYPE_CHECKING:
@@ -210,7 +210,7 @@ def error_beyond(known: float, quantity: str, length: float, patches: float, cel
         law = LOOP_ERRORS[quantity]
         words = f"with {_two_digits(length)} cells in {LENGTH}, {law.describe(length)} on other surfaces"
         return "" if known >= law.at(length) else f"on this grid, whose error is not known; {words}"
-    if quantity in ESTIMATED_OF_LOOPS:
+    if quantity in (*ESTIMATED_OF_LOOPS, *OF_SQUARES):
         return "" if known else "on this grid, whose error is not known"
     if quantity == "contact_area_fraction" and known < (error := error_of_area(patches, cells))[0]:
         return f"on this grid, {error[1]}"

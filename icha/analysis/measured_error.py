@@ -7,6 +7,7 @@ from icha.analysis.left_out import NOT_COMPARED, NOT_REQUESTED, LeftOut, find_le
 from icha.analysis.validity import Statement, statements_on_dataset
 from icha.contact.models import DEFAULT_MODEL
 from icha.datasets.variables.campaign import COMPLETE, NOT_IN_DESIGN
+from icha.support.formatting import format_count
 
 _QUANTITIES = {"area_error": "contact area", "separation_error": "mean separation"}
 
@@ -23,11 +24,18 @@ def measured_errors(model_error: xr.DataTree) -> dict[str, Statement]:
         errors = node.to_dataset()
         if not np.isfinite(errors["area_error"]).any():
             continue
-        ranges = ", ".join(f"{words} {_range(errors[variable].values)}" for variable, words in _QUANTITIES.items())
         known = np.isfinite(errors["area_error"])
-        seeds = int(known.any([dim for dim in known.dims if dim != "seed"]).sum())
+        good = known & (errors["applicability"] == "")
+        shown = good if good.any() else known
+        ranges = ", ".join(
+            f"{words} {_range(errors[variable].where(shown).values)}" for variable, words in _QUANTITIES.items()
+        )
+        seeds = int(shown.any([dim for dim in known.dims if dim != "seed"]).sum())
         loads = errors.sizes["reduced_pressure"]
         among = f"{seeds} {'seed' if seeds == 1 else 'seeds'}, {loads} {'load' if loads == 1 else 'loads'}"
+        if others := int((known & ~good).any("reduced_pressure").sum()):
+            among += f"; without {format_count(others, 'run')}" if good.any() else "; all in runs"
+            among += " to which the model is not applicable"
         among += f"; {words}" if (words := left_out_runs(errors).sentence) else ""
         found[name] = Statement(
             "error", f"of the asperity model in study {name}: {ranges} ({among}, boundary elements)"

@@ -11,7 +11,7 @@ import math
 FULL_CONTACT_BELOW, HIGH_PULL_OFF_BELOW = 1.0, 2.0
 MEANING = (
     f"below {FULL_CONTACT_BELOW:g}, full contact has a lower energy than separated surfaces; below about "
-    f"{HIGH_PULL_OFF_BELOW:g}, a high pull-off tension is expected; dgamma is that of advancing edges"
+    f"{HIGH_PULL_OFF_BELOW:g}, a high pull-off tension is expected"
 )
 
 

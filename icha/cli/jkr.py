@@ -77,7 +77,7 @@ def jkr(
         if roughness is not None:
             from icha.configuration.topographies import read_scan
 
-            rough = read_scan(roughness, boundary="free")
+            rough = read_scan(roughness, boundary="free", missing="fill")
         with warnings.catch_warnings():
             # The warnings are part of the result.
             warnings.simplefilter("ignore", IchaWarning)

@@ -162,6 +162,8 @@ def _noise(scan) -> Iterator[str]:
             f"the spectrum ends in a noise floor of {rms} rms; waves shorter than {wavelength} are mostly noise, and "
             f"contribute {noise.slope_share:.0%} of the mean square slope"
         )
+        if scan.filled:
+            yield "interpolated heights also contribute to the noise floor"
         if scan.cutoff:
             yield (
                 f"with `cutoff: {formatting.length(scan.cutoff)}`, noise contributes "

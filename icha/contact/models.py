@@ -167,7 +167,13 @@ MODELS = {
                 "attraction, the strength of the interface; otherwise the largest tension that the grid resolves",
                 "float64",
             ),
-            "contact_map": (_MAP, "1", "part of the cell that is in contact", "float32"),
+            "contact_map": (
+                _MAP,
+                "1",
+                "part of the cell in contact; at a short range, contact_area_fraction is smaller than the mean: it "
+                "is corrected for the edges",
+                "float32",
+            ),
             "contact_pressure": (_MAP, "Pa", "pressure in the cell, negative in tension", "float32"),
             "gap_map": (
                 _MAP,

@@ -101,6 +101,7 @@ _QUANTITIES = {
     # materials and surfaces
     "contact_modulus": Quantity("contact modulus", _MODULUS, "Pa"),
     "surface_energy": Quantity("surface energy", r"\Delta\gamma", "J m^-2"),
+    "receding_energy": Quantity("surface energy of receding edges", "", "J m^-2"),
     "interaction_range": Quantity("range of attraction", "", "m"),
     "tabor_parameter": Quantity("Tabor parameter", r"\mu"),
     "rms_slope": Quantity("rms slope", _SLOPE),

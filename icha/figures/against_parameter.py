@@ -519,7 +519,8 @@ squares fits to the last unloading up to the largest tension. Each fit compares 
 with the given E* and R. Triangles are the pull-off force divided by the pull-off force 3/2 π Δγ R of a smooth sphere.
 Closed markers are means over the seeds; open markers are the single seeds. Lines join means of the same surface or
 shape and the same material. Values of a smooth sphere by JKR are 1."""
-_DIRECTED = "For circles, Δγ is that of advancing edges; for squares and triangles, that of receding edges."
+_DIRECTED = """For circles, Δγ is that of advancing edges; for squares and triangles, that of receding edges. Fits to
+unloading leave out states whose edge stands."""
 
 
 @in_style

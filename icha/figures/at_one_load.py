@@ -47,7 +47,7 @@ def _draw(ax, lines, line, look, own, true, **truth_look):
     draw_members(ax, *own, look, curves=len(lines), **of_line)
     if line.truths:
         say(ax, "Dashed lines are only means." if 1 < len(line.truths) < ENOUGH else "")
-        truth_look = TRUTH_LINE | {"color": look["color"]} | truth_look
+        truth_look = TRUTH_LINE | truth_look
         draw_members(ax, *true, truth_look, positive=True, name=line.truth_name, curves=None, ls=TRUTH_LINE["ls"])
 
 
@@ -130,7 +130,8 @@ def distributions(campaign: xr.DataTree, *, study: str, kind: str | None = None,
         )
         for ax, own, true in ((left, gaps, true_gaps), (right, pressures, true_pressures)):
             every = 1 + len(true[0]) // _BESIDE_MARKERS if true else 1
-            _draw(ax, lines, line, look, own, true, marker=MODEL_MARKERS[REFERENCE_NAME], markevery=every)
+            beside = {"color": looks.colour(line.runs.contact), "marker": MODEL_MARKERS[REFERENCE_NAME]}
+            _draw(ax, lines, line, look, own, true, markevery=every, **beside)
         floor = drop_rounding_errors(gaps[1].mean(axis=0)).min(initial=floor)
         density = pressures[1].mean(axis=0)
         inside = pressures[0][density > 1e-3 * density.max(initial=0)]
@@ -284,7 +285,8 @@ def patch_sizes(campaign: xr.DataTree, *, study: str, kind: str | None = None, t
         smooth = look | {"marker": "none", "lw": 1.4 * look["lw"]}
         drawn = [(patch_density, look, MODEL_MARKERS[REFERENCE_NAME]), (patches_above, smooth, "none")]
         for ax, (points, line_look, marker) in zip(panels, drawn[-len(panels) :], strict=True):
-            _draw(ax, lines, line, line_look, points(own, cell), true and points(true, cell), marker=marker)
+            beside = {"color": looks.colour(line.runs.contact), "marker": marker}
+            _draw(ax, lines, line, line_look, points(own, cell), true and points(true, cell), **beside)
     for ax in panels:
         logarithmic_axes(ax)
         ax.set_xlabel(f"patch area  $A$ ({unit}²)")

@@ -85,8 +85,7 @@ def _draw_errors(campaign, model_error, study, names, *, percent, words):
             for ax, name in zip(row, names, strict=True):
                 members = (100 if percent else 1) * errors[name].values
                 handle = draw_points(ax, loads, members, look, positive=not percent, shift=shift, **of_curve)
-            if applicable:
-                named.setdefault(looks.place_name(contact[1:]) if own_rows else looks.name(contact), handle)
+            named.setdefault(looks.place_name(contact[1:]) if own_rows else looks.name(contact), handle)
         for ax in row if own_rows else ():
             ax.set_title(looks.material_name(shown[0]), loc="right", fontsize=8)
     low, high = panels[0, 0].dataLim.intervalx

@@ -360,6 +360,7 @@ of all seeds, at most one hundred of each run at equal steps of the indentation.
 E* Δγ), where no sphere of JKR has contact (Δγ of receding edges), are not shown. Lines are fits of JKR with the given
 E* and R, one for each seed. A fit minimises the squared differences of a³ at given F, so states with a large radius
 have most weight. The legend gives the means over the seeds of the fitted work of adhesion."""
+_STANDING = "In unloading with two works of adhesion, states whose edge stands are neither drawn nor fitted."
 
 
 @in_style
@@ -387,7 +388,8 @@ def jkr_plot(campaign: xr.DataTree, *, study: str) -> Figure:
     scale, unit = choose_unit(max(float(np.abs(x).max(initial=0.0)) for *_, x, _ in drawn), "N")
     fig, [panels] = new_panels(3.0, sharex=True, sharey=True)
     dataset = campaign[study].to_dataset()
-    say(fig, _LINE, without_fit(dataset), only_spheres(dataset))
+    directed = bool((dataset["receding_energy"] > dataset["surface_energy"]).any())
+    say(fig, _LINE, _STANDING if directed else "", without_fit(dataset), only_spheres(dataset))
     for branch, each, labels, run, x, y in drawn:
         ax = panels[list(_TITLES).index(branch)]
         plot(ax, x * scale, y * 1e3, Name("states", labels), marker=_TITLES[branch][1], mec=each.colour, **_STATES)

@@ -214,6 +214,7 @@ def _indenters(campaign):
         if energy:
             jumped = format_quantity(contact_radius_at("indentation", 0.0, *properties), "m")
             at_zero = f"{format_quantity(at_rest, 'm')} ({at_rest * cells:.2g} cells) at zero load"
+            at_zero += " in loading" if material.receding_energy else ""
             found = [f"{jumped} after the jump-in", at_zero, *found]
         receding = material.receding_energy or energy
         released = pull_off_state(shape, material.contact_modulus, receding) if energy else None

@@ -60,6 +60,11 @@ class Answer(NamedTuple):
         return (self.high - self.low) / 2
 
     @property
+    def relative_half_width(self) -> float:
+        """Half-width divided by the magnitude of the estimate; infinite without an interval."""
+        return np.inf if math.isnan(self.half_width) or not self.value else self.half_width / abs(self.value)
+
+    @property
     def _digits(self) -> int:
         """Number of decimal places of the estimate and its interval."""
         return max(0, 1 - math.floor(math.log10(self.half_width))) if self.half_width > 0 else 3
@@ -162,7 +167,8 @@ def sentences(answers: list[Answer]) -> list[str]:
         state = next((each.state for each in reversed(of_contact) if each.state), "")
         main = [each for each in of_contact if each.state in (state, "")][:2]
         numbers = "; ".join(f"{each.quantity} {each.number}" for each in main)
-        found.append(f"{contact}{f' at {state}' if state else ''}: {numbers}. {main[0].limit}")
+        widest = max(main, key=lambda each: each.relative_half_width)
+        found.append(f"{contact}{f' at {state}' if state else ''}: {numbers}. {widest.limit}")
     inputs = " They include the scatter of the sampled parameters." if "inputs" in answers[0].shares else ""
     return [*found, f"Intervals contain the mean over all realisations in {100 * PROBABILITY:g} % of cases.{inputs}"]
 

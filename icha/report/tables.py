@@ -139,7 +139,7 @@ def _list(values: list) -> str:
 
 def materials_table(studies: Mapping[str, xr.Dataset]) -> Table:
     """Return the table of all materials."""
-    names = ("contact_modulus", "surface_energy", "interaction_range")
+    names = ("contact_modulus", "surface_energy", "receding_energy", "interaction_range")
     rows = {}
     for study in studies.values():
         for material in study["material"].values.tolist():
@@ -182,7 +182,9 @@ def surfaces_table(surfaces: Iterable[xr.Dataset]) -> Table:
         first = members[0]
         grid, boundary = f"{int(first['grid'])}²", first.attrs.get("boundary", "periodic")
         rows.append((name, _list(sorted(int(each["seed"]) for each in members)), boundary, grid, *cells))
-    caption = "Surfaces, as measured or at the rms slope of the file. Studies scale the heights to their rms slopes"
+    caption = (
+        "Surfaces, after the preparation of a scan (filter, window). Studies scale the heights to their rms slopes"
+    )
     *titles, curvature = map(_words, powers)
     return Table(caption, ("surface", "seeds", "boundary", "grid", *titles, f"1/{curvature}"), rows)
 

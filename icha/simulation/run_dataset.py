@@ -162,7 +162,7 @@ def _attributes(surface, material, path, name):
     attributes = file_attributes(
         f"Rough contact {'with' if material.surface_energy > 0 else 'without'} adhesion, {model.title}",
         f"{'Loading and unloading' if path.cyclic else 'Loading sweep'} of a "
-        f"{'periodic rough surface' if not surface.free else 'single rough square'} against an "
+        f"{'periodic rough surface' if not surface.free else 'single square'} against an "
         f"elastic half-space by {model.method}.",
         COMPUTED,
         references=f"{model.references}; {_STICKINESS_PAPER}",
