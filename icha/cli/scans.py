@@ -71,7 +71,7 @@ def describe_scan(name: str, scan, *, to_scale: bool = True, models: Iterable[Mo
 def _reading(scan, to_scale: bool) -> Iterator[str]:
     """Yield lines on the format of the file, on points without a height, and on opposite edges that do not fit."""
     share = formatting.share(scan.filled, scan.points)
-    filled = f"heights of {format_count(scan.filled, 'point')} interpolated ({share} of all points)"
+    filled = f"heights of {format_count(scan.filled, 'point')} interpolated ({share} of the square)"
     array = f", `data: {printable(scan.data)}`, one of several" if scan.data else ""
     yield f"read as {scan.format}{array}, {filled if scan.filled else 'all points have a height'}"
     points = scan.reading.partition(", ")[2]

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from icha.contact.attraction import FINITE_RANGE, SHORT_RANGE
-from icha.datasets.labels import LABELS
 from icha.figures.select import has_layer, has_shape, lacks_fit, lacks_sphere
 
 if TYPE_CHECKING:
@@ -83,13 +80,16 @@ def grid_of_loops(campaign: xr.DataTree, studies: Sequence[str]) -> str:
     return f"Grid: {describe_loops(loops)}." if loops else ""
 
 
-def count_runs(data: Mapping[str, object], studies: Sequence[str], *, of_loss: bool = False) -> str:
+def count_runs(
+    data: Mapping[str, object], studies: Sequence[str], models: Collection[str] = (), *, of_loss: bool = False
+) -> str:
     """Count the runs that a figure leaves out or draws pale, in sentences for the end of its caption; often empty.
 
     Parameters
     ----------
     data : datasets of the figure, by name.
     studies : names of the studies whose runs the figure shows.
+    models : names of the models that the figure shows; empty if they are not known.
     of_loss : True if the figure shows losses, which runs that failed checks of their loss do not have.
     """
     from icha.analysis.left_out import absent_materials, left_out_of_study
@@ -112,8 +112,9 @@ def count_runs(data: Mapping[str, object], studies: Sequence[str], *, of_loss: b
             )
         found += [f"Without a curve{suffix}: {each}." for each in absent_materials(study)]
         if "applicability" in study:  # not in campaigns of earlier versions
-            status = study["status"].transpose(*LABELS).values
-            reasons = study["applicability"].transpose(*LABELS).values[np.isin(status, LOADED_RUNS)]
-            for reason, count in Counter(filter(None, map(str, reasons))).items():
+            shown = study["status"].isin(LOADED_RUNS)
+            shown &= study["model"].isin(list(models)) if models else True
+            reasons = study["applicability"].where(shown, "").values.ravel()
+            for reason, count in Counter(filter(None, reasons.tolist())).items():
                 found.append(f"Note on {count} {'run' if count == 1 else 'runs'}{suffix}: {reason}.")
     return " ".join(found)

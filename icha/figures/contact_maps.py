@@ -79,7 +79,8 @@ mean height is zero. The title gives surface, material and load."""
 _COMPARED = """Panel (b) shows the contact of boundary elements on the same topography at the same load (black). Panel
 (c) enlarges the framed region around the largest spot of (a): edges of contact of the asperity model (red) and of
 boundary elements (black), also of holes. Panel (d) shows where both models are in contact, and where only one is; the
-overlap is the ratio of the areas in contact in both models and in at least one."""
+overlap is the ratio of the areas in contact in both models and in at least one. These areas are counts of cells, which
+are larger than the contact area, because this is corrected for the edges."""
 
 
 @in_style

@@ -72,6 +72,11 @@ def record(axes: Axes, x: Any, y: Any, name: Name | str, **columns: Any) -> None
     figure.__dict__.setdefault("recorded", []).append((axes, {"curve": name.curve, "x": x, "y": y} | labels | columns))
 
 
+def models_of(figure: Figure) -> set[str]:
+    """Return the names of the models whose runs a figure has recorded."""
+    return {columns["model"] for _, columns in getattr(figure, "recorded", []) if columns.get("model")}
+
+
 def count_seeds(axes: Axes, words: str, handle: Artist, counts: Iterable[int]) -> None:
     """Name the scatter of means over `counts` seeds in the legend of a figure."""
     found = axes.get_figure().__dict__.setdefault("scatter_of_means", {})

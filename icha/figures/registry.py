@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from icha.datasets.results import figure_number
 from icha.datasets.table import as_csv
 from icha.figures.captions import count_runs, units_of_shapes
-from icha.figures.drawn import caption_of, say, table_of
+from icha.figures.drawn import caption_of, models_of, say, table_of
 from icha.figures.style import GREY, in_style, new_figure, save
 from icha.support.atomic_files import whole_file
 from icha.support.scripts import caption_in
@@ -91,7 +91,7 @@ def draw_figure(
         temporary.write_text(as_csv(table_of(figure)), encoding="utf-8")
     with whole_file(text) as temporary:
         of_loss = any("loss" in axes.get_ylabel() for axes in figure.axes)
-        counts = count_runs(data, studies, of_loss=of_loss)
+        counts = count_runs(data, studies, models_of(figure), of_loss=of_loss)
         temporary.write_text(f"{caption} {counts}".strip() + "\n", encoding="utf-8")
 
 
