@@ -1,6 +1,7 @@
 """Figures of indenters: what is drawn agrees with the runs and with the theory of JKR."""
 
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -26,7 +27,13 @@ PULL_OFF = 1.5 * math.pi * ENERGY * RADIUS
 FIGURES = loops.force_indentation, loops.jkr_plot, against_parameter.work_of_adhesion
 
 
-def press(shape=Sphere(RADIUS), rms=0.0, energy=ENERGY):  # noqa: B008, a frozen value
+def press(*arguments, **named):
+    """Return a loop that the test may change."""
+    return _press(*arguments, **named).copy(deep=True)
+
+
+@cache
+def _press(shape=Sphere(RADIUS), rms=0.0, energy=ENERGY):  # noqa: B008, a frozen value
     waves = rms * math.sqrt(2) * np.cos(np.arange(GRID) * np.pi / 4)
     surface = icha.Surface(np.tile(waves, (GRID, 1)), SIDE, "free", shape)
     path = icha.Path(indentations=[1e-8], unload=True)
