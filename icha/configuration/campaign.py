@@ -100,7 +100,7 @@ class Campaign(Section):
     studies: Annotated[dict[Name, Study], Field(min_length=1)]
     """Studies by name."""
     measurements: Annotated[dict[Name, Measurement], _FEW] = {}
-    """Your own measurements by name. Figure 5 shows the measurements together with the results of runs."""
+    """Your own measurements by name. Figures 5 and 17 to 19 show them together with the results of runs."""
     figures: Figures = Figures()
     """Figures to draw, with options."""
     publication: Publication = Publication()
@@ -234,7 +234,7 @@ class Campaign(Section):
         yield from self.figures.script_problems()
         for label, entry in self.measurements.items():
             try:
-                read_columns(entry.path, entry.columns, entry.limits(self))
+                read_columns(entry.path, entry.columns, entry.limits(self), entry.signed)
             except ValueError as error:
                 yield ("measurements", label, "path"), entry.path, str(error)
 

@@ -219,8 +219,11 @@ class MapFigure(SnapshotFigure, RunFigure):
         return found
 
 
-class SlopesAndMaterialsFigure(TruthFigure):
-    """A figure of all runs of a study, with boundary elements and measurements."""
+class MeasuredFigure(StudyFigure):
+    """A figure of all runs of a study, with measurements."""
+
+    # True if the figure shows measured values of indenters.
+    of_indenters: ClassVar[bool] = False
 
     def inputs(self, campaign, files):
         """Also return the paths of the tables of measurements for the study, if any."""
@@ -229,16 +232,29 @@ class SlopesAndMaterialsFigure(TruthFigure):
 
     def arguments(self, campaign):
         """Return the arguments with the `measurements`."""
-        known = []
-        for each in self.measurements(campaign):
-            names = ("label", "citation", "columns", "material", "rms_slope")
-            modulus = campaign.materials[each.material].contact_modulus if each.load_is_pressure else None
-            known.append({name: getattr(each, name) for name in names} | {"contact_modulus": modulus})
+        known = [self.known(campaign, each) for each in self.measurements(campaign)]
         return super().arguments(campaign) | ({"measurements": known} if known else {})
 
+    def known(self, campaign: Campaign, measurement: Measurement) -> dict[str, Any]:
+        """Return what the function that draws needs about a measurement."""
+        return {name: getattr(measurement, name) for name in ("label", "citation", "columns", "material")}
+
     def measurements(self, campaign: Campaign) -> list[Measurement]:
-        """Return the measurements that belong to the study."""
-        return [measurement for measurement in campaign.measurements.values() if measurement.study == self.study]
+        """Return the measurements that belong to the study and to the figure."""
+        known = campaign.measurements.values()
+        return [each for each in known if each.study == self.study and (each.load is None) == self.of_indenters]
+
+
+class SlopesAndMaterialsFigure(MeasuredFigure, TruthFigure):
+    """A figure of all runs of a study, with boundary elements and measurements."""
+
+    def known(self, campaign, measurement):
+        """Also return the rms slope and, for loads in units of pressure, the contact modulus."""
+        modulus = campaign.materials[measurement.material].contact_modulus if measurement.load_is_pressure else None
+        return super().known(campaign, measurement) | {
+            "rms_slope": measurement.rms_slope,
+            "contact_modulus": modulus,
+        }
 
 
 class SlopesFigure(TopographyFigure):
@@ -321,8 +337,19 @@ class SnapMapFigure(RunFigure, UnloadedFigure):
     """A figure of jumps and unions in one run: the first run that fits the options, if possible with adhesion."""
 
 
-class IndenterFigure(UnloadedFigure):
-    """A figure of the runs of a study with indenters, in loading and unloading."""
+class IndenterFigure(MeasuredFigure, UnloadedFigure):
+    """A figure of the runs of a study with indenters, in loading and unloading, with measurements."""
+
+    of_indenters: ClassVar[bool] = True
+
+    def known(self, campaign, measurement):
+        """Also return the names of the quantities, in the order of the columns, and the works of adhesion."""
+        found = super().known(campaign, measurement) | {"quantities": list(measurement.si_units)}
+        material = campaign.materials.get(measurement.material)
+        if material is None:
+            return found
+        works = material.surface_energy, material.receding_energy or material.surface_energy
+        return found | {"works": works}
 
     def study_problems(self, campaign, study):
         """Also yield a problem if a surface of the study is periodic."""

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+import os
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from icha.figures.captions import (
 from icha.figures.curves import drop_rounding_errors, gap_name
 from icha.figures.drawn import Name, plot, record, say
 from icha.figures.ensembles import Points
-from icha.figures.indenter_curves import select_series
+from icha.figures.indenter_curves import CROSSES, read_measured, select_series
 from icha.figures.looks import (
     ASPERITIES_NAME,
     REFERENCE_NAME,
@@ -510,6 +511,8 @@ _UNITS_OF_WORK = {
     "work_of_adhesion_approach": "surface_energy",
     "work_of_adhesion_retraction": "receding_energy",
 }
+# Measured quantities, with the branch for the legend.
+_MEASURED_WORKS = {"advancing_work": "loading", "receding_work": "unloading"}
 _ONE_SEED = {"ls": "none", "ms": 3.2, "mew": 0.6, "mfc": "white"}
 _MEAN = {"lw": 0.9, "ms": 5.0}
 
@@ -524,10 +527,17 @@ unloading leave out states whose edge stands."""
 
 
 @in_style
-def work_of_adhesion(campaign: xr.DataTree, *, study: str) -> Figure:
+def work_of_adhesion(
+    campaign: xr.DataTree,
+    tables: Sequence[str | os.PathLike] = (),
+    *,
+    study: str,
+    measurements: Sequence[Mapping[str, Any]] = (),
+) -> Figure:
     """Draw works of adhesion of fits and of pull-off, divided by the surface energy.
 
-    Lines join means over seeds of series that differ only in their rms height.
+    Lines join means over seeds of series that differ only in their rms height. Tables and measurements
+    (`icha.figures.indenter_curves.read_measured`) with rms heights and works of adhesion are shown too.
     """
     series = select_series(campaign, study, only_jkr=True)
     if not any("pull_off_force_over_jkr" in run for each in series for run in each.runs.by_seed.values()):
@@ -560,6 +570,13 @@ def work_of_adhesion(campaign: xr.DataTree, *, study: str) -> Figure:
         if means:
             plot(ax, *np.transpose(means), f"{name}, mean", marker=marker, color=colour, **_MEAN)
             handles[name] = legend_handle(color=GREY if contact else colour, marker=marker, **_MEAN)
+    markers = itertools.cycle(CROSSES)
+    for each in read_measured(fig, tables, measurements, "rms_height", any_of=_MEASURED_WORKS):
+        for (name, branch), work in zip(_MEASURED_WORKS.items(), each.works, strict=True):
+            if name in each.values:
+                label, look = f"{each.label}, {branch}", each.look | {"marker": next(markers)}
+                plot(ax, each.values["rms_height"] * scale, each.values[name] / work, label, **look)
+                handles[label] = legend_handle(**look)
     ax.axhline(1, color=GREY, lw=0.6, zorder=0)
     ax.set(xlabel=f"rms height of the roughness ({unit})", ylabel=r"work of adhesion over $\Delta\gamma$")
     ax.margins(y=0.15)

@@ -8,12 +8,22 @@ import numpy as np
 
 from icha.contact.models import REFERENCE_MODEL
 from icha.figures import select
+from icha.figures.drawn import say
 from icha.figures.looks import distinct_colours, graded_colours
 from icha.figures.style import BLACK
 from icha.support.formatting import format_quantity
+from icha.support.tables import read_columns
 
 if TYPE_CHECKING:
+    import os
+    from collections.abc import Iterable, Mapping, Sequence
+
     import xarray as xr
+    from matplotlib.figure import Figure
+
+# Look of measured points; measurements differ in their marker.
+MEASURED = {"ls": "none", "ms": 3.6, "mew": 0.8, "color": BLACK, "zorder": 5}
+CROSSES = "x+1234"
 
 # Points of a theoretical curve.
 _POINTS = 400
@@ -115,3 +125,50 @@ def theory_curves(run: xr.Dataset, largest_radius: float) -> dict[str, tuple[np.
             jkr = sphere_contact(np.linspace(smallest, largest_radius, _POINTS), radius, modulus, work)
             curves = {name: (jkr.indentation, jkr.force)} | curves
     return curves
+
+
+class Measured(NamedTuple):
+    """A measurement of an indenter.
+
+    Attributes
+    ----------
+    label : name in the legend.
+    material : material of the measurement; None if it is not given.
+    works : works of adhesion of the material, advancing and receding, J/m^2; None without a material.
+    values : measured values in SI units, arrays of the same length by quantity.
+    look : look of the points, with the marker.
+    """
+
+    label: str
+    material: str | None
+    works: tuple[float, float] | None
+    values: dict[str, np.ndarray]
+    look: dict[str, object]
+
+
+def read_measured(
+    figure: Figure,
+    tables: Sequence[str | os.PathLike],
+    measurements: Sequence[Mapping],
+    *needed: str,
+    any_of: Iterable[str] = (),
+) -> list[Measured]:
+    """Return the measurements that a figure shows, and name them in its caption.
+
+    Parameters
+    ----------
+    tables, measurements : path of each table; its `label`, `citation`, `columns` (headings and factors), `quantities`
+        (names by column), `material`, and `works` if the material is known.
+    needed, any_of : quantities that a shown measurement has; at least one of `any_of`, if any.
+    """
+    found, sources = [], []
+    for k, (table, known) in enumerate(zip(tables, measurements, strict=True)):
+        names = known["quantities"]
+        if {*needed} <= {*names} and (not any_of or {*any_of} & {*names}):
+            columns = read_columns(table, known["columns"], signed=known["columns"])
+            look = MEASURED | {"marker": CROSSES[k % len(CROSSES)]}
+            values = dict(zip(names, columns, strict=True))
+            found.append(Measured(known["label"], known["material"], known.get("works"), values, look))
+            sources.append(f"{known['label']} ({known['citation']})")
+    say(figure, f"Crosses are measurements: {'; '.join(sources)}." if sources else "")
+    return found

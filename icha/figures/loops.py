@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+import os
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -20,7 +22,7 @@ from icha.figures.captions import (
 )
 from icha.figures.curves import Panel, panel_in_units
 from icha.figures.drawn import Name, plot, record, say
-from icha.figures.indenter_curves import select_series, theory_curves
+from icha.figures.indenter_curves import read_measured, select_series, theory_curves
 from icha.figures.looks import (
     BRANCH_DASHES,
     MODEL_MARKERS,
@@ -288,10 +290,17 @@ _THEORY_WORDS = {
 
 
 @in_style
-def force_indentation(campaign: xr.DataTree, *, study: str) -> Figure:
+def force_indentation(
+    campaign: xr.DataTree,
+    tables: Sequence[str | os.PathLike] = (),
+    *,
+    study: str,
+    measurements: Sequence[Mapping[str, Any]] = (),
+) -> Figure:
     """Draw force against indentation for all runs of a study, with the theories for each radius and material.
 
-    Series have a panel each if they are many, or if they differ in more than the rms height.
+    Series have a panel each if they are many, or if they differ in more than the rms height. Tables and measurements
+    (`icha.figures.indenter_curves.read_measured`) with forces and indentations are shown too.
     """
     series = select_series(campaign, study)
     runs = [run for each in series for run in each.runs.by_seed.values()]
@@ -311,6 +320,11 @@ def force_indentation(campaign: xr.DataTree, *, study: str) -> Figure:
         if by_height
         else "",
     )
+    measured = read_measured(fig, tables, measurements, *names)
+    points = [(panel.points(each.values), each) for each in measured]
+    for axis, ends in enumerate(limits):
+        drawn = np.concatenate([ends, *(values[axis] for values, _ in points)])
+        limits[axis] = _limits(drawn) if points else ends
     largest = max(float(run["contact_radius"].max()) for run in runs)
     theories = {}
     for ax, of_panel in zip(panels, shown, strict=True):
@@ -323,6 +337,9 @@ def force_indentation(campaign: xr.DataTree, *, study: str) -> Figure:
                 for branch, leg in select.branches(run):
                     name = Name(branch, each.runs.labels._replace(seed=seed))
                     plot(ax, *panel.points(leg), name, color=each.colour, ls=BRANCH_DASHES[branch], **_LOOP)
+        for values, each in points:
+            if each.material in (None, *(one.runs.labels.material for one in of_panel)):
+                plot(ax, *values, each.label, **each.look)
         ax.axhline(0, color=GREY, lw=0.5, zorder=0)
         if len(shown) > 1:
             ax.set_title(of_panel[0].name, loc="right")
@@ -341,6 +358,7 @@ def force_indentation(campaign: xr.DataTree, *, study: str) -> Figure:
     handles = {each.name: legend_handle(color=each.colour, **_LOOP) for each in named}
     handles |= {name: legend_handle(color=BLACK, ls=dashes, **_LOOP) for name, dashes in BRANCH_DASHES.items()}
     handles |= {f"{name}, smooth sphere": legend_handle(**_THEORIES[name]) for name in theories}
+    handles |= {each.label: legend_handle(**each.look) for each in measured}
     legend_below(fig, handles)
     return fig
 
@@ -364,11 +382,19 @@ _STANDING = "In unloading with two works of adhesion, states whose edge stands a
 
 
 @in_style
-def jkr_plot(campaign: xr.DataTree, *, study: str) -> Figure:
+def jkr_plot(
+    campaign: xr.DataTree,
+    tables: Sequence[str | os.PathLike] = (),
+    *,
+    study: str,
+    measurements: Sequence[Mapping[str, Any]] = (),
+) -> Figure:
     """Draw a^(3/2)/R against F/a^(3/2) for loading and unloading, with the fitted JKR lines.
 
     The equation of JKR, F = 4 E* a^3/(3 R) - sqrt(8 pi E* w a^3), is the straight line y = 3 (x + sqrt(8 pi E* w))/(4
     E*) with x = F/a^(3/2) and y = a^(3/2)/R. Runs without adhesion, without a radius R, and on a layer are left out.
+    Tables and measurements (`icha.figures.indenter_curves.read_measured`) with forces and contact radii are shown too.
+    The largest force is the end of loading, and R is that of the runs.
     """
     from icha.references.indenter_runs import BRANCHES, spaced_states, steps_of
 
@@ -383,7 +409,8 @@ def jkr_plot(campaign: xr.DataTree, *, study: str) -> Figure:
                 force, radius = (np.array([state[name] for state in chosen]) for name in ("force", "contact_radius"))
                 x, y = force / radius**1.5, radius**1.5 / float(run["shape_radius"])
                 # The line of JKR is zero here. States beyond it, of little contact area, would hide the others.
-                inside = x > -np.sqrt(8 * np.pi * float(run["contact_modulus"] * run["surface_energy"]))
+                work = max(float(run["surface_energy"]), float(run["receding_energy"]))
+                inside = x > -np.sqrt(8 * np.pi * float(run["contact_modulus"]) * work)
                 drawn.append((branch, each, labels, run, x[inside], y[inside]))
     scale, unit = choose_unit(max(float(np.abs(x).max(initial=0.0)) for *_, x, _ in drawn), "N")
     fig, [panels] = new_panels(3.0, sharex=True, sharey=True)
@@ -397,13 +424,20 @@ def jkr_plot(campaign: xr.DataTree, *, study: str) -> Figure:
             modulus = float(run["contact_modulus"])
             line = 0.75 / modulus * (x + np.sqrt(8 * np.pi * modulus * float(run[name])))
             plot(ax, x * scale, line * 1e3, Name("fit of JKR", labels), color=each.colour, **_FIT)
+    measured = read_measured(fig, tables, measurements, "force", "contact_radius")
+    for each in measured:
+        force, radius = each.values["force"], each.values["contact_radius"]
+        x, y = force / radius**1.5, radius**1.5 / float(series[0].first_run["shape_radius"])
+        top = int(np.argmax(force))
+        for ax, part in zip(panels, (slice(top + 1), slice(top, None)), strict=True):
+            plot(ax, x[part] * scale, y[part] * 1e3, each.label, **each.look)
     for ax, (name, _) in zip(panels, _TITLES.values(), strict=True):
         ax.set_title(name, loc="right")
         ax.set(xlabel=rf"$F/a^{{3/2}}$  ({unit} m$^{{-3/2}}$)", ylabel=r"$a^{3/2}/R$  ($10^{-3}$ m$^{1/2}$)")
         ax.label_outer()
     handles = {f"{each.name}: {_works(each)}": legend_handle(color=each.colour, **_FIT) for each in series}
     states = {"states": legend_handle(marker="o", mec=GREY, **_STATES), "fit of JKR": legend_handle(color=GREY, **_FIT)}
-    legend_below(fig, handles | states)
+    legend_below(fig, handles | states | {each.label: legend_handle(**each.look) for each in measured})
     return fig
 
 

@@ -9,12 +9,12 @@ import math
 import os
 import re
 import zlib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from icha.support.input_files import TooLarge, bounded_memory, problem_with_path
-from icha.support.rules import POSITIVE, FloatRange
+from icha.support.rules import NUMBER, POSITIVE, FloatRange
 
 if TYPE_CHECKING:
     import numpy as np
@@ -172,7 +172,9 @@ def _decimal_sign(fields):
     return "."
 
 
-def numbers_of(rows: list[Row], columns: Mapping[int, str], rule: FloatRange = POSITIVE) -> list[np.ndarray]:
+def numbers_of(
+    rows: list[Row], columns: Mapping[int, str], rule: FloatRange = POSITIVE, signed: Collection[int] = ()
+) -> list[np.ndarray]:
     """Return the numbers in some columns; raise ValueError if one is not within the bounds of `rule`.
 
     The numbers of all these columns have the same decimal sign, a point or a comma.
@@ -182,25 +184,29 @@ def numbers_of(rows: list[Row], columns: Mapping[int, str], rule: FloatRange = P
     rows : rows of the table.
     columns : name of each column for messages, by its index from 0.
     rule : bounds of the numbers; positive by default.
+    signed : columns of finite numbers without bounds.
     """
     import numpy as np  # imported here because most commands read no table
 
     decimal = _decimal_sign([row[column] for _, row in rows for column in columns])
     found = []
     for column, name in columns.items():
-        numbers = []
+        numbers, bounds = [], NUMBER if column in signed else rule
         for line, row in rows:
             try:
-                numbers.append(rule.validate("", _number(row[column], decimal)))
+                numbers.append(bounds.validate("", _number(row[column], decimal)))
             except ValueError:
-                text = f"column {name}, line {line}: {row[column][:40]!r}; expected {rule.expected}"
+                text = f"column {name}, line {line}: {row[column][:40]!r}; expected {bounds.expected}"
                 raise ValueError(text) from None
         found.append(np.array(numbers))
     return found
 
 
 def read_columns(
-    path: str | os.PathLike, columns: Mapping[str, float], limits: Mapping[str, tuple[float, str]] | None = None
+    path: str | os.PathLike,
+    columns: Mapping[str, float],
+    limits: Mapping[str, tuple[float, str]] | None = None,
+    signed: Collection[str] = (),
 ) -> list[np.ndarray]:
     """Read columns of positive numbers from a table with a line of headings; return one array for each column.
 
@@ -209,6 +215,7 @@ def read_columns(
     path : path of the file.
     columns : heading of each column to read, with the factor by which the numbers of this column are multiplied.
     limits : largest product in a column, and a text for messages after "is more than", by heading.
+    signed : headings of columns whose numbers may be zero or negative.
 
     Raises
     ------
@@ -220,7 +227,8 @@ def read_columns(
         if headings.count(heading) != 1:
             reason = f"has {headings.count(heading) or 'no'} column{'s' * (heading in headings)} {heading!r}"
             raise ValueError(f"{reason}; expected one of {', '.join(headings)}")
-    found = numbers_of(rows, {headings.index(heading): repr(heading) for heading in columns})
+    named = {headings.index(heading): repr(heading) for heading in columns}
+    found = numbers_of(rows, named, signed={headings.index(heading) for heading in signed})
     found = [values * factor for values, factor in zip(found, columns.values(), strict=True)]
     for heading, values in zip(columns, found, strict=True):
         most, text = (limits or {}).get(heading, (math.inf, ""))

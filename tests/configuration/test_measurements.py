@@ -41,6 +41,67 @@ def test_beside_a_shape_pressures_need_no_slope_and_reduced_pressures_do(load, t
         load(shape | {"measurements": {"lab": too_large}})
 
 
+def _lens(**columns):
+    known = {"force": "mN", "indentation": "um", "contact_radius": "um"} | dict.fromkeys(["rms_height"], "nm")
+    known |= dict.fromkeys(["advancing_work", "receding_work"], "mJ/m^2")
+    columns = {name: {"column": text, "unit": known[name]} for name, text in columns.items()}
+    return _measurement(load=None, area=None, material=None, rms_slope=None) | columns
+
+
+SHAPE = {"surfaces.rough.shape": {"sphere": {"radius": "1 mm"}}, "studies.one.models": ["boundary_elements"]}
+
+
+def test_measurements_of_indenters_may_be_negative(load, tmp_path):
+    (tmp_path / "points.csv").write_text("F (mN),d,a\n-1,-20,1\n2,5,2\n")
+    lens = _lens(force="F (mN)", indentation="d", contact_radius="a") | {"material": "soft"}
+    figures = {"fig17_force_indentation": {"study": "one"}, "fig5_multi_slope": {"study": "one"}}
+    changes = SHAPE | {"measurements": {"lab": lens}, "figures": figures, "studies.one.unload": True}
+    campaign = load(changes).campaign
+    (known,) = campaign.figures.by_name()["fig17_force_indentation"].arguments(campaign)["measurements"]
+    assert known["columns"] == pytest.approx({"F (mN)": 1e-3, "d": 1e-6, "a": 1e-6})
+    assert known["quantities"] == ["force", "indentation", "contact_radius"]
+    assert "measurements" not in campaign.figures.by_name()["fig5_multi_slope"].arguments(campaign)
+
+
+@pytest.mark.parametrize(
+    ("columns", "changes", "message"),
+    [
+        ({"force": "a"}, {}, "lab: has columns of force; expected load and area"),
+        ({}, {}, "lab: has columns of no quantity"),
+        ({"force": "a", "indentation": "b", "rms_height": "c"}, {}, "or rms_height with advancing_work"),
+        ({"force": "a", "indentation": "a"}, {}, "several quantities have the same column"),
+        ({"rms_height": "a", "advancing_work": "b"}, {}, "rms_height without material; expected this key"),
+        ({"force": "a", "contact_radius": "b"}, {}, "column 'b', line 2: '-2'; expected a number greater than 0"),
+        ({"force": "a (N)", "contact_radius": "b"}, {}, "force: the unit is 'mN', but the heading 'a (N)' states 'N'"),
+        (
+            {"force": "a", "indentation": "b"},
+            {"load": _measurement()["load"]},
+            "has columns of load, force, indentation",
+        ),
+        (
+            {"force": "a", "indentation": "b"},
+            {name: _measurement()[name] for name in ("load", "area", "material", "rms_slope")},
+            "has columns of figure 5 and of indenters",
+        ),
+    ],
+)
+def test_measurements_of_indenters_that_cannot_be_drawn(columns, changes, message, load, tmp_path):
+    (tmp_path / "points.csv").write_text("a,b\n1,-2\n")
+    with pytest.raises(ConfigurationError, match=r"measurements\.lab") as error:
+        load(SHAPE | {"measurements": {"lab": _lens(**columns) | changes}})
+    assert message in str(error.value)
+
+
+def test_contact_radii_need_one_lens(load, tmp_path):
+    (tmp_path / "points.csv").write_text("F,a\n1,2\n")
+    other = {"kind": "smooth", "side": "1 mm", "grid": 32, "shape": {"sphere": {"radius": "2 mm"}}}
+    changes = {"surfaces.other": other, "studies.one.surfaces": ["rough", "other"]}
+    with pytest.raises(
+        ConfigurationError, match=r"contact_radius: 'a' has a study whose surfaces have different radii"
+    ):
+        load(SHAPE | changes | {"measurements": {"lab": _lens(force="F", contact_radius="a")}})
+
+
 @pytest.mark.parametrize(
     "content",
     [

@@ -91,6 +91,7 @@ def write_data(folder):
     q = np.geomspace(2 * np.pi / 100e-6, 2 * np.pi / 13e-6, 20)
     icha.SpectrumTable(q, spectrum.psd(q)).save(folder / "sample.txt")
     (folder / "rubber.csv").write_text("pressure,area\n0.8,0.12\n2.4,0.37\n", encoding="utf-8")
+    (folder / "lens.csv").write_text("force,depth,radius\n-0.02,-0.1,40\n0.2,1.7,70\n", encoding="utf-8")
     z = heights / 1e-4
     np.savetxt(folder / "surface.2048x2048.ASCII.dat", z)
     np.savetxt(folder / "surface.0512x0512.ASCII.xyz.dat", np.column_stack([x.ravel(), y.ravel(), z.ravel()]))

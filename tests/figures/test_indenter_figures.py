@@ -189,6 +189,41 @@ def test_fig5_draws_a_measurement_of_a_rough_sphere_where_the_run_is(tmp_path):
     assert "Relative loads take the place of reduced pressures, because a surface has a shape" in caption_of(figure)
 
 
+def test_measurements_of_indenters_are_drawn_in_the_units_of_the_figures(campaign, tmp_path):
+    """The points of the smooth sphere's run, as a table, lie on its curves."""
+    run = next(iter(select_series(campaign, "press")[0].runs.by_seed.values()))
+    steps = np.flatnonzero(run["contact_radius"].values > 0)
+    force, depth, radius = (run[name].values[steps] for name in ("force", "indentation", "contact_radius"))
+    height = 1e-8
+    columns = {"force": force * 1e3, "indentation": depth * 1e6, "contact_radius": radius * 1e6}
+    columns |= {"rms_height": np.full(len(steps), height * 1e9), "receding_work": np.full(len(steps), 2e3 * ENERGY)}
+    np.savetxt(
+        tmp_path / "own.csv", np.transpose([*columns.values()]), header=",".join(columns), comments="", delimiter=","
+    )
+    known = {"label": "own", "citation": "A. Author (2000)", "material": "soft", "works": (ENERGY, ENERGY)}
+    known |= {"columns": dict(zip(columns, (1e-3, 1e-6, 1e-6, 1e-9, 1e-3), strict=True)), "quantities": [*columns]}
+
+    def drawn(draw):
+        fig = draw(campaign, [tmp_path / "own.csv"], study="press", measurements=[known])
+        assert "Crosses are measurements: own (A. Author (2000))." in caption_of(fig)
+        shown = [[each for each in ax.get_lines() if each.get_marker() == "x"] for ax in fig.axes]
+        return fig, [np.concatenate([each.get_xydata() for each in found]) for found in shown]
+
+    fig, points = drawn(loops.force_indentation)
+    curves = np.concatenate([line.get_xydata() for line in fig.axes[0].get_lines() if line.get_marker() == "None"])
+    for point in points[0]:
+        assert np.isclose(curves, point, rtol=1e-6, atol=1e-9).all(axis=1).any()
+    fig, points = drawn(loops.jkr_plot)
+    top = int(np.argmax(force))
+    assert [len(each) for each in points] == [top + 1, len(steps) - top]
+    scale = {"kN": 1e-3, "N": 1.0, "MN": 1e-6, "mN": 1e3}[fig.axes[0].get_xlabel().split("(")[1].split()[0]]
+    expected = np.transpose([force / radius**1.5 * scale, radius**1.5 / RADIUS * 1e3])
+    np.testing.assert_allclose(points[0], expected[: top + 1], rtol=1e-6)
+    fig, points = drawn(against_parameter.work_of_adhesion)
+    unit = {"nm": 1e9, "µm": 1e6}[fig.axes[0].get_xlabel().split("(")[1].rstrip(")")]
+    np.testing.assert_allclose(points[0][0], [height * unit, 2.0])
+
+
 def test_captions_state_the_units_of_shapes():
     campaign = tree_of(press(energy=0.0))
     figure, studies = against_load.stiffness(campaign, study="press"), [campaign["press"].to_dataset()]
