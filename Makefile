@@ -15,7 +15,7 @@ export UV_COMPILE_BYTECODE := 1
 unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help publish environment tamaas slurm-environment run validation hysteresis test test-all random-cases audit wheel lint format schema docs linkcheck benchmarks short-range indenter applicability validators-environment validate clean
+.PHONY: help publish environment tamaas slurm-environment run validation hysteresis test test-all random-cases audit wheel lint format schema docs linkcheck benchmarks short-range indenter jkr-test applicability validators-environment validate clean
 
 help:
 	@echo "make run            run the campaign of config/config.yaml, or of CONFIG=FILE, on $(CORES) cores"
@@ -36,6 +36,7 @@ help:
 	@echo "make benchmarks     measure ICHA and other codes (four hours; OPTIONS='--only icha'); see docs/benchmarks.md"
 	@echo "make short-range    compare boundary elements with closed forms (ten minutes); see docs/short_range.md"
 	@echo "make indenter       compare indenters with closed forms and ContactMechanics (half an hour); see docs/indenter.md"
+	@echo "make jkr-test       count how often intervals of JKR tests contain the truth (ten minutes); see docs/estimates.md"
 	@echo "make applicability  compare asperities with boundary elements on sixty surfaces (ten minutes); see docs/limits.md"
 	@echo "make slurm-environment  install Snakemake and its Slurm executor in .venv-slurm; see docs/howto/cluster.md"
 	@echo "make validate DEPOSIT=FOLDER_OR_ZIP  check a deposit with programs of other projects, without network"
@@ -87,8 +88,8 @@ hysteresis: environment
 
 indenter: .venv-benchmarks/.installed
 short-range: tamaas
-indenter applicability: environment
-short-range indenter applicability:
+indenter jkr-test applicability: environment
+short-range indenter jkr-test applicability:
 	python -m validation.$(subst -,_,$@) $(OPTIONS)
 
 test: tamaas

@@ -1,6 +1,6 @@
 """How often the intervals of `icha.fit_jkr_test` contain the truth: table of docs/estimates.md.
 
-    python -m validation.jkr_test [--tests N] [--tables]
+    make jkr-test, or python -m validation.jkr_test [--tests N] [--tables]
 
 Each synthetic test has its own lens, modulus, works of adhesion, load and noise. Its equations are written here, apart
 from those of the fit: the force at each contact radius follows from the energy release rate, and states at given forces

@@ -162,6 +162,14 @@ def test_limits_of_the_law_are_warnings(options, changes, message):
         icha.fit_jkr_test(table, changes.get("radius", RADIUS), **options)
 
 
+@pytest.mark.parametrize(("ratio", "column", "warned"), [(8, 1, False), (30, 1, True), (30, 0, False)])
+def test_loads_far_above_pull_off_need_contact_radii(ratio, column, warned):
+    states = exact_test(load=ratio * 1.5 * math.pi * 0.09 * RADIUS)
+    table = noisy_test(states, np.random.default_rng(1), COLUMNS[column:][:1])
+    test = icha.fit_jkr_test(table, RADIUS, indentation_offset=0.0)
+    assert any("times the pull-off force: noise hides the adhesion" in text for text in test.warnings) == warned
+
+
 def test_points_of_another_law_have_correlated_residuals():
     table = {"force": EXACT["force"], "contact_radius": EXACT["contact_radius"] ** 2 / EXACT["contact_radius"].max()}
     with pytest.warns(icha.IchaWarning, match="residuals of neighbouring points are correlated"):
