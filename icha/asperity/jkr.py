@@ -5,6 +5,8 @@ surface energy, the same formulas give Hertz's law. Equation numbers are those o
 adhesive contact of rough soft media with an advanced asperity model".
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,10 +22,44 @@ _MAX_NEWTON_STEPS = 200
 class JKR:
     """Contact of one paraboloid with an elastic half-space.
 
-    The solver of many spots uses only the methods of this class.
+    The solver of many spots uses only the methods of this class. `icha.asperity.directed_jkr` overrides some of them.
     """
 
     material: Material
+
+    @property
+    def moves(self) -> np.ndarray | bool:
+        """Mask of the spots whose edges move when their approaches change; True for all spots of this law."""
+        return True
+
+    @property
+    def work(self) -> np.ndarray | float:
+        """Energy release rate at the edges of the spots, J/m^2: the work of adhesion."""
+        return self.material.surface_energy
+
+    @property
+    def adhesion_length(self) -> np.ndarray | float:
+        """Energy release rate at the edges divided by the contact modulus, m."""
+        return self.work / self.material.contact_modulus
+
+    @property
+    def receding(self) -> JKR:
+        """Law of spots whose edges recede."""
+        return self
+
+    def select(self, which) -> JKR:
+        """Return the law of selected spots: indices or a mask."""
+        return self
+
+    def find_states(self, approach, R, before, present) -> tuple[JKR, np.ndarray]:
+        """Return the law of n sites in equilibrium at given approaches, and their contact radii, (n,), m.
+
+        before : (n,) float, contact radii in the last equilibrium, m; this law does not depend on them.
+        present : (n,) bool, False for sites whose contact radius is zero.
+        """
+        a = np.zeros(len(R))
+        a[present] = self.contact_radius(approach[present], R[present])
+        return self, a
 
     def force(self, a, R):
         """Return the contact force F, N, eq. (1): 4 E* a^3/(3R) - sqrt(8 pi E* gamma a^3)."""
@@ -35,23 +71,27 @@ class JKR:
 
     def adhesive_force(self, a):
         """Return the flat-punch part of the force, sqrt(8 pi E* gamma a^3), N; positive in tension."""
-        return np.sqrt(8 * np.pi * self.material.contact_modulus * self.material.surface_energy * a**3)
+        return np.sqrt(8 * np.pi * self.material.contact_modulus * self.work * a**3)
 
     def approach(self, a, R):
         """Return the approach delta, m, eq. (2): a^2/R - sqrt(2 pi a gamma/E*)."""
-        return a**2 / R - np.sqrt(2 * np.pi * a * self.material.adhesion_length)
+        return a**2 / R - np.sqrt(2 * np.pi * a * self.adhesion_length)
 
     def force_derivative(self, a, R):
         """Return dF/da, N/m."""
         return 4 * self.material.contact_modulus * a**2 / R - 1.5 * np.sqrt(
-            8 * np.pi * self.material.contact_modulus * self.material.surface_energy * a
+            8 * np.pi * self.material.contact_modulus * self.work * a
         )
+
+    def area_derivative(self, a):
+        """Return the derivative of the contact area with respect to a, m."""
+        return 2 * np.pi * a
 
     def approach_derivative(self, a, R):
         """Return d(delta)/da = 2a/R - sqrt(pi gamma/(2 E* a)) for a > 0; eq. (7) of the paper lacks the 2."""
         slope = 2 * a / R
         if self.material.surface_energy > 0:
-            slope = slope - np.sqrt(np.pi * self.material.adhesion_length / (2 * a))
+            slope = slope - np.sqrt(np.pi * self.adhesion_length / (2 * a))
         return slope
 
     def radius_derivative(self, a, R):
@@ -67,7 +107,7 @@ class JKR:
         approach, R = np.broadcast_arrays(np.asarray(approach, float), np.asarray(R, float))
         if self.material.surface_energy == 0:
             return np.sqrt(R * np.maximum(approach, 0.0))
-        a_unit = np.cbrt(self.material.adhesion_length * R**2)
+        a_unit = np.cbrt(self.adhesion_length * R**2)
         d = approach * R / a_unit**2
         c = np.sqrt(2 * np.pi)
         # This start is not below the root: (u + v)^4 >= u^4 + v^3 (u + v) with u^4 = d, v^3 = c.
@@ -87,17 +127,25 @@ class JKR:
 
         8 E* a^5/(15 R^2) - (8/3) sqrt(pi E* gamma/2) a^(7/2)/R + pi gamma a^2, from eqs. (1) and (2).
         """
-        E, gamma = self.material.contact_modulus, self.material.surface_energy
+        E, gamma = self.material.contact_modulus, self.work
         hertz = 8 / 15 * E * a**5 / R**2
         return hertz - 8 / 3 * np.sqrt(np.pi * E * gamma / 2) * a**3.5 / R + np.pi * gamma * a**2
 
     def jump_off_radius(self, R):
         """Return the contact radius at the smallest approach, where contact breaks, (pi gamma R^2/(8 E*))^(1/3), m."""
-        return np.cbrt(np.pi / 8 * self.material.adhesion_length * np.asarray(R, float) ** 2)
+        return np.cbrt(np.pi / 8 * self.adhesion_length * np.asarray(R, float) ** 2)
 
     def jump_off_approach(self, R):
         """Return the smallest approach of the JKR law, -(3/4) (pi^2 gamma^2 R/E*^2)^(1/3), m."""
-        return -0.75 * np.cbrt(np.pi**2 * self.material.adhesion_length**2 * np.asarray(R, float))
+        return -0.75 * np.cbrt(np.pi**2 * self.adhesion_length**2 * np.asarray(R, float))
+
+    def lowest_approach(self, R, before):
+        """Return the approach at which contact breaks, m; `before` is the contact radius in the last equilibrium, m."""
+        return self.jump_off_approach(R)
+
+    def jump_off_energy(self, R, before):
+        """Return the energy that a spot loses when its contact breaks, J; `before` as in `lowest_approach`."""
+        return self.energy(self.jump_off_radius(R), R)
 
     def jump_in_approach(self, R):
         """Return the approach at which contact forms, (1 - 2.641 mu^(3/7)) epsilon, eq. (3), m; negative for a gap.
@@ -132,7 +180,7 @@ class JKR:
             t = np.where(far, 1 / s, 0.0)
             bracket = np.where(far, t * (4 / 3 + t**2 * (2 / 15 + t**2 * (3 / 70 + t**2 * 5 / 252))), bracket)
             hertz = np.where(outside, a**2 / (np.pi * R) * bracket, a**2 / R - r**2 / (2 * R))
-        punch = np.sqrt(8 * a * self.material.adhesion_length / np.pi) * arc
+        punch = np.sqrt(8 * a * self.adhesion_length / np.pi) * arc
         return np.where(a > 0, hertz - punch, 0.0)
 
     def displacement_derivative(self, r, a, R):
@@ -146,8 +194,8 @@ class JKR:
         value = 2 / np.pi * arc * self.approach_derivative(a, R)
         if self.material.surface_energy > 0:
             edge = np.sqrt(np.maximum(r**2 - a**2, 0.05 * a**2))
-            neck = np.sqrt(8 * self.material.adhesion_length * a / np.pi) / edge
-            value = value - np.where(outside, neck, 0.0)
+            neck = np.sqrt(8 * self.adhesion_length * a / np.pi) / edge
+            value = value - np.where(outside & self.moves, neck, 0.0)
         return value
 
     def second_moment(self, a, R):
@@ -182,7 +230,7 @@ class JKR:
     def pressure_amplitudes(self, a, R):
         """Return P and B (Pa) of the pressure in eq. (8), p(r) = P sqrt(1-r^2/a^2) - B/sqrt(1-r^2/a^2)."""
         peak = 2 * self.material.contact_modulus * a / (np.pi * R)
-        neck = np.sqrt(2 * self.material.contact_modulus * self.material.surface_energy / (np.pi * a))
+        neck = np.sqrt(2 * self.material.contact_modulus * self.work / (np.pi * a))
         return peak, neck
 
     def pressure(self, r, a, R):
@@ -213,6 +261,13 @@ class JKR:
         """
         volume_i, volume_j = a_i**4 / R_i, a_j**4 / R_j
         return np.hypot(a_i, a_j), np.hypot(R_i, R_j), volume_j / (volume_i + volume_j)
+
+    def unite(self, i, j, a, radius) -> JKR:
+        """Return the law of the unions of spots i and j (indices), whose contact radii are `radius`, m.
+
+        a : (n,) float, contact radii of all spots, m; this law does not depend on them.
+        """
+        return self
 
 
 def wu_gap(tabor_parameter: np.ndarray | float) -> np.ndarray | float:

@@ -258,9 +258,9 @@ class Campaign(Section):
                 reason = f"need a half-space, because their law is that of a half-space, but {name!r} is a layer"
                 yield ("models", index), label, f"{reason}; expected [boundary_elements], or no `thickness` in {name!r}"
             material = self.materials[name]
-            if MODELS[label].by_summits and (material.receding_energy or material.adhesion_map):
-                reason = f"have one work of adhesion, but {name!r} has several, by direction or place"
-                yield ("models", index), label, f"{reason}; expected [boundary_elements]"
+            if MODELS[label].by_summits and material.adhesion_map:
+                reason = f"have the same work of adhesion everywhere, but {name!r} has a map"
+                yield ("models", index), label, f"{reason}; expected [boundary_elements], or no map in {name!r}"
         for (index, label), name in itertools.product(enumerate(study.models), study.surfaces):
             if MODELS[label].by_summits and not self.is_flat(name):
                 reason = f"need a nominally flat surface, because they are wrong on shapes, but {name!r} has a shape"

@@ -199,8 +199,8 @@ class MaterialSection(Section):
     `adhesion_map`. The advancing value may be such a map; the receding one is then a mean, and both have the same
     factors from place to place."""
     receding_energy: SurfaceEnergy | None = None
-    """Work of adhesion of a receding edge, for studies that vary it; `surface_energy` with two values sets it. Only
-    with `models: [boundary_elements]`. Default: that of an advancing edge."""
+    """Work of adhesion of a receding edge, for studies that vary it; `surface_energy` with two values sets it. Default:
+    that of an advancing edge."""
     adhesion_map: AdhesionMapSection | None = None
     """Works of adhesion from place to place, relative to their mean; `surface_energy` with a map sets it."""
     interaction_range: Length = Field(default=f"{VAN_DER_WAALS_RANGE * 1e9:g} nm", validate_default=True)

@@ -32,21 +32,21 @@ _APPROACH_AHEAD = 0.02
 _RADIUS_AHEAD = 1.2
 
 
-def pressure_or_area_fraction(contact: AsperityContact, quantity: str, a, R) -> float:
+def pressure_or_area_fraction(contact: AsperityContact, law: JKR, quantity: str, a, R) -> float:
     """Return for n spots the nominal pressure (Pa) if `quantity` is PRESSURE, otherwise the contact area fraction.
 
-    a, R : (n,) float, contact radii and radii of curvature of the spots, m.
+    law : law of the spots in their states; a, R : (n,) float, contact radii and radii of curvature of the spots, m.
     """
     if quantity == PRESSURE:
-        return float(np.sum(contact.law.force(a, R))) / contact.area
+        return float(np.sum(law.force(a, R))) / contact.area
     return float(np.sum(np.pi * a**2)) / contact.area
 
 
-def derivative_by_radius(contact: AsperityContact, quantity: str, a, R):
+def derivative_by_radius(contact: AsperityContact, law: JKR, quantity: str, a, R):
     """Return the derivatives of `pressure_or_area_fraction` with respect to the n contact radii, (n,)."""
     if quantity == PRESSURE:
-        return contact.law.force_derivative(a, R) / contact.area
-    return 2 * np.pi * a / contact.area
+        return law.force_derivative(a, R) / contact.area
+    return law.area_derivative(a) / contact.area
 
 
 def radius_slope(law: JKR, a, R, approach, jump_off_approach):
@@ -56,7 +56,7 @@ def radius_slope(law: JKR, a, R, approach, jump_off_approach):
     """
     slope = np.zeros(len(a))
     touching = (a > 0) & (approach >= jump_off_approach)
-    slope[touching] = law.radius_derivative(a[touching], R[touching])
+    slope[touching] = law.select(touching).radius_derivative(a[touching], R[touching])
     return slope
 
 
@@ -75,6 +75,7 @@ class Evaluation:
     repulsion : sum of the repulsive parts of all forces, divided by the nominal area, Pa; 0 if no load is prescribed.
         `Equations.error_size` compares the error of a small load with a fraction of this value.
     interaction : elastic interaction of the spots.
+    law : law of the sites in their states.
     """
 
     approach: np.ndarray
@@ -85,6 +86,7 @@ class Evaluation:
     control_error: float
     repulsion: float
     interaction: Interaction
+    law: JKR
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,24 +110,26 @@ class Equations:
         interaction : interaction of an earlier evaluation. It is used again if it belongs to the same half-space, and
             if no contact radius exceeds the radii for which it was set up. Otherwise a new interaction is set up.
         """
-        contact, sites, law = self.contact, self.sites, self.contact.law
+        contact, sites = self.contact, self.sites
         present, R = sites.present, sites.radius_of_curvature
-        a = np.zeros(len(sites))
-        a[present] = law.contact_radius(approach[present], R[present])
+        law, a = contact.law.find_states(approach, R, sites.contact_radius, present)
         half_space = sites.half_space
         if interaction is None or interaction.half_space is not half_space or np.any(a > interaction.largest_radius):
             ahead = np.where(present, approach + _APPROACH_AHEAD * contact.rms_height, 0.0)
-            largest = np.where(present, _RADIUS_AHEAD * law.contact_radius(ahead, R), 0.0)
-            interaction = Interaction.between(law, half_space, R, largest)
-        equilibrium_height = approach + interaction.displacement(a) + separation
+            largest = np.where(present, _RADIUS_AHEAD * contact.law.contact_radius(ahead, R), 0.0)
+            interaction = Interaction.between(half_space, R, np.maximum(largest, a))
+        equilibrium_height = approach + interaction.displacement(law, a) + separation
         error = np.where(present, equilibrium_height - sites.height, 0.0)
         control_error = repulsion = 0.0
         if self.control is not None:
             quantity, target = self.control.quantity, self.control.target
-            control_error = pressure_or_area_fraction(contact, quantity, a[present], R[present]) - target
+            spots = law.select(present), quantity, a[present], R[present]
+            control_error = pressure_or_area_fraction(contact, *spots) - target
             if quantity == PRESSURE:
                 repulsion = float(np.sum(law.repulsive_force(a[present], R[present]))) / contact.area
-        return Evaluation(approach, separation, a, equilibrium_height, error, control_error, repulsion, interaction)
+        return Evaluation(
+            approach, separation, a, equilibrium_height, error, control_error, repulsion, interaction, law
+        )
 
     def error_size(self, evaluation: Evaluation, target_weight: float = _TARGET_WEIGHT) -> float:
         """Return the larger of two errors: the largest error of the sites, in h_rms, and the error of load or area.

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from icha.asperity.directed_jkr import DirectedJKR
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
 from icha.contact.model import AREA_FRACTION, PRESSURE, Control
@@ -47,7 +48,7 @@ class InteractingAsperities(AsperityContact):
         return ContactState(
             separation=separation,
             sites=Sites.empty(self.law, asperities),
-            contact_radius=np.empty(0),
+            law=self.law,
             site_of_asperity=np.full(len(asperities), -1),
             last_approach=asperities.height - separation,
             last_separation=np.full(len(asperities), separation),
@@ -65,12 +66,14 @@ class InteractingAsperities(AsperityContact):
 
     def pressure(self, state: ContactState) -> float:
         """Return the force divided by the nominal area, Pa."""
-        return pressure_or_area_fraction(self, PRESSURE, state.spots.contact_radius, state.spots.radius_of_curvature)
+        spots = state.spots
+        return pressure_or_area_fraction(self, spots.law, PRESSURE, spots.contact_radius, spots.radius_of_curvature)
 
     def area_fraction(self, state: ContactState) -> float:
         """Return the contact area divided by the nominal area."""
         spots = state.spots
-        return pressure_or_area_fraction(self, AREA_FRACTION, spots.contact_radius, spots.radius_of_curvature)
+        radii = spots.contact_radius, spots.radius_of_curvature
+        return pressure_or_area_fraction(self, spots.law, AREA_FRACTION, *radii)
 
     def mean_gap(self, state: ContactState) -> float:
         """Return the mean gap, m; on a periodic surface it is the mean separation.
@@ -80,7 +83,7 @@ class InteractingAsperities(AsperityContact):
         if not self.asperities.free:
             return state.separation
         spots = state.spots
-        force = self.law.force(spots.contact_radius, spots.radius_of_curvature)
+        force = spots.law.force(spots.contact_radius, spots.radius_of_curvature)
         displacement = mean_displacement(self.asperities.period, self.contact_modulus, spots.position, force)
         return state.separation + displacement
 
@@ -94,10 +97,10 @@ class InteractingAsperities(AsperityContact):
 
     def slope(self, quantity: str, state: ContactState) -> float:
         """Return d(quantity)/d(mean separation) while no event occurs; `quantity` is PRESSURE or AREA_FRACTION."""
-        sites, c = state.sites, state.contact_index
-        a, R = state.contact_radius[c], sites.radius_of_curvature[c]
-        growth = radius_slope(self.law, a, R, sites.approach[c], sites.jump_off_approach[c]) * sites.response[c]
-        return float(np.sum(derivative_by_radius(self, quantity, a, R) * growth))
+        sites, c, law = state.sites, state.contact_index, state.spots.law
+        a, R = sites.contact_radius[c], sites.radius_of_curvature[c]
+        growth = radius_slope(law, a, R, sites.approach[c], sites.jump_off_approach[c]) * sites.response[c]
+        return float(np.sum(derivative_by_radius(self, law, quantity, a, R) * growth))
 
     def stored_energy(self, state: ContactState) -> float:
         """Return the elastic energy minus the energy of adhesion, per nominal area, J/m^2; zero without contact.
@@ -107,14 +110,15 @@ class InteractingAsperities(AsperityContact):
         different size do not act equally on each other. So along a path without events, the change of the energy is not
         exactly the work done. At a distance r of two spots, the difference is about (a/r)^2 of the interaction energy.
         """
-        spots, law = state.spots, self.law
+        spots, law = state.spots, state.spots.law
         a, R = spots.contact_radius, spots.radius_of_curvature
         displacement = spots.height - state.separation - spots.approach
         return float(np.sum(law.energy(a, R) + 0.5 * law.force(a, R) * displacement)) / self.area
 
     def front_dissipation(self, state: ContactState) -> float:
-        """Return 0: fronts advance and recede at the same work of adhesion."""
-        return 0.0
+        """Return what receding fronts have dissipated so far, J/m^2 of nominal area; 0 with one work of adhesion."""
+        material = self.law.material
+        return (material.receding.surface_energy - material.surface_energy) * state.receded_area / self.area
 
     def reason_beyond(self, state: ContactState) -> str:
         """Return an empty text: the areas and gaps of the path limit this model."""
@@ -156,7 +160,7 @@ class AsperityObservables:
 
     def of_snapshot(self, state: ContactState) -> dict:
         """Return the distributions of gap and pressure, and for each spot the properties named `spot_…`, SI units."""
-        law, spots = self.contact.law, state.spots
+        law, spots = state.spots.law, state.spots
         return {
             **gap_distribution(law, self.surface, state),
             **pressure_distribution(law, self.surface, spots),
@@ -197,16 +201,19 @@ class AsperityObservables:
 def contact_of(surface: Surface, material: Material) -> InteractingAsperities:
     """Return the contact of a surface and a material.
 
-    Raises `ValueError` for a layer, for works of adhesion by direction or place, for a surface with a shape and for a
-    surface without summits. On a shape the model is wrong: the pull-off force of a rough sphere was 0.4 times that of
+    Raises `ValueError` for a layer, for a map of the work of adhesion, for a surface with a shape and for a surface
+    without summits. On a shape the model is wrong: the pull-off force of a rough sphere was 0.4 times that of
     boundary elements.
     """
     if material.layered:
         raise ValueError(
             f"thickness: {material.thickness:g} m; the asperity model is only for a half-space. Use boundary elements"
         )
-    if material.directed or material.adhesion_map:
-        raise ValueError("surface_energy: the asperity model has one work of adhesion. Use boundary elements")
+    if material.adhesion_map:
+        raise ValueError(
+            "surface_energy: the asperity model has the same work of adhesion at every place. Use boundary elements"
+        )
     if surface.shape:
         raise ValueError("shape: the asperity model is only for nominally flat surfaces. Use boundary elements")
-    return InteractingAsperities(JKR(material), find_summits(surface), surface.unit_height, surface.unit_slope)
+    law = DirectedJKR(material) if material.directed else JKR(material)
+    return InteractingAsperities(law, find_summits(surface), surface.unit_height, surface.unit_slope)

@@ -25,6 +25,7 @@ class IterationState:
         `apply_jump_in`; -1 for other asperities.
     was_released : (asperities,) bool, whether a union has released an asperity during this search.
     barred : (asperities,) bool, whether an asperity may not make contact again because it broke contact in this search.
+    receded_area : area over which edges have receded, as in `ContactState`, m^2.
     new_unions : indices of the sites of unions that have no heights yet.
     log : events of this search so far, each a row of kind, position, members, energy and asperity.
     """
@@ -40,6 +41,7 @@ class IterationState:
     was_released: np.ndarray
     barred: np.ndarray
     new_unions: np.ndarray
+    receded_area: float
     barred_count: int = 0
     log: tuple = ()
 
@@ -69,6 +71,7 @@ class IterationState:
             was_released=np.zeros(count, dtype=bool),
             barred=np.zeros(count, dtype=bool),
             new_unions=np.empty(0, dtype=int),
+            receded_area=state.receded_area,
         )
 
     @property
@@ -87,6 +90,11 @@ class IterationState:
     def with_approach(self, approach) -> IterationState:
         """Return a copy of the state with other approaches (n,) of its sites, m."""
         return replace(self, sites=replace(self.sites, approach=approach))
+
+    def with_radii(self, sites, a) -> IterationState:
+        """Return a copy of the state to whose `receded_area` sites (indices or a mask) with contact radii a, m, add."""
+        area = np.pi * np.maximum(self.sites.contact_radius[sites] ** 2 - a**2, 0.0)
+        return replace(self, receded_area=self.receded_area + float(np.sum(area)))
 
     def with_events(self, kind, position, members, energy=0.0, asperity=-1) -> IterationState:
         """Return a copy of the state with k more events of one kind at the end of its log.

@@ -60,7 +60,8 @@ def apply_jump_in(state: IterationState, evaluation: Evaluation, margin: float) 
     state, evaluated = _evaluate_approaches(state, evaluation, spots, margin)
     released = state.released_from[evaluated] >= 0
     threshold = contact.jump_in_approach[evaluated] + margin
-    threshold[released] = law.jump_off_approach(asperities.radius_of_curvature[evaluated[released]])
+    R = asperities.radius_of_curvature[evaluated[released]]
+    threshold[released] = law.lowest_approach(R, law.jump_off_radius(R))
     ready = state.last_approach[evaluated] >= threshold
     if not contact.adhesive:
         ready &= state.last_approach[evaluated] > 0
@@ -88,7 +89,8 @@ def apply_jump_in(state: IterationState, evaluation: Evaluation, margin: float) 
 
 def _sudden_growth(contact, x, y):
     """Return x h_rms + y |delta_off|, m, a possible increase of an approach by jumps of spots (see _SUDDEN_GUESS)."""
-    return x * contact.rms_height - y * contact.law.jump_off_approach(np.max(contact.asperities.radius_of_curvature))
+    R = np.max(contact.asperities.radius_of_curvature)
+    return x * contact.rms_height - y * contact.law.receding.jump_off_approach(R)
 
 
 def _evaluate_approaches(state, evaluation, spots, margin):
@@ -103,7 +105,8 @@ def _evaluate_approaches(state, evaluation, spots, margin):
     evaluated = np.flatnonzero((largest >= contact.jump_in_approach) & state.lacks_site)
     points, position = asperities.position[evaluated], sites.position[spots]
     a, R, ewald = evaluation.a[spots], sites.radius_of_curvature[spots], sites.half_space.ewald.for_one_sum
-    w = displacement_at(contact.law, asperities.period, points, position, a, R, ewald)
+    law = evaluation.law.select(spots)
+    w = displacement_at(law, asperities.period, points, position, a, R, ewald)
     last_approach, last_separation = state.last_approach.copy(), state.last_separation.copy()
     last_approach[evaluated] = asperities.height[evaluated] - evaluation.separation - w
     last_separation[evaluated] = evaluation.separation
@@ -132,6 +135,7 @@ def _add_sites(state, asperity, status, approach):
         position=asperities.position[asperity],
         height=asperities.height[asperity],
         radius_of_curvature=asperities.radius_of_curvature[asperity],
+        contact_radius=state.contact.law.jump_off_radius(asperities.radius_of_curvature[asperity]),
         asperity=asperity,
         members=np.ones(len(asperity), dtype=int),
         union=np.full(len(asperity), None),
@@ -190,8 +194,8 @@ def _break_contact(state, breaking):
     new = np.isin(sites.asperity, state.asperities_jumped_in) & breaking
     spots = np.flatnonzero(breaking & ~new)
     R = sites.radius_of_curvature[spots]
-    energy = law.energy(law.jump_off_radius(R), R)
-    state = state.delete_jumps_in(sites.asperity[new])
+    energy = law.jump_off_energy(R, sites.contact_radius[spots])
+    state = state.with_radii(spots, 0.0).delete_jumps_in(sites.asperity[new])
     state = state.with_events(JUMP_OFF, sites.position[spots], sites.members[spots], energy)
     # For asperities without a site, -1 selects the appended value False.
     freed = np.append(breaking, False)[state.site_of_asperity]

@@ -92,8 +92,8 @@ def _linearise(equations, evaluation):
     jump_off_approach = sites.jump_off_approach[present]
     returns = _returns_to_contact(sites, evaluation)[present] & equations.contact.adhesive
     approach = np.where(returns, jump_off_approach, evaluation.approach[present])
-    slope = radius_slope(equations.contact.law, a, R, approach, jump_off_approach)
-    tangents = evaluation.interaction.tangent(evaluation.a)
+    slope = radius_slope(evaluation.law.select(present), a, R, approach, jump_off_approach)
+    tangents = evaluation.interaction.tangent(evaluation.law, evaluation.a)
 
     def radius_change(x):
         """Return the changes of all contact radii (n,) for changes x of the approaches (m,)."""
@@ -124,7 +124,8 @@ def _solve_step(equations, evaluation, exact):
     # each approach. The other unknowns are the differences from these predictions, so the matrix is near the identity.
     last = sites.response[present]
     R = sites.radius_of_curvature[present]
-    gradient = slope * derivative_by_radius(contact, control.quantity, evaluation.a[present], R)
+    law = evaluation.law.select(present)
+    gradient = slope * derivative_by_radius(contact, law, control.quantity, evaluation.a[present], R)
     rate = float(np.sum(gradient * last))
     if rate == 0:
         raise NotConverged("no contact radius changes with the separation, so the load or area cannot be reached")
@@ -157,15 +158,17 @@ def _take_step(equations, evaluation, step):
     approach = evaluation.approach + step
     if not equations.contact.adhesive:
         return approach
-    sites, law = equations.sites, equations.contact.law
+    sites, law = equations.sites, evaluation.law
     jump_off_approach = sites.jump_off_approach
     returns = _returns_to_contact(sites, evaluation)
     stays_past = (evaluation.approach < jump_off_approach) & ~returns
     approach[stays_past] = np.minimum(approach, jump_off_approach)[stays_past]
-    close = np.flatnonzero(sites.present & ((step < 0) & (evaluation.approach > jump_off_approach) | returns))
-    lowest = law.jump_off_radius(sites.radius_of_curvature[close])
+    close = sites.present & ((step < 0) & (evaluation.approach > jump_off_approach) | returns)
+    close = np.flatnonzero(close & law.moves)
+    lowest = law.select(close).jump_off_radius(sites.radius_of_curvature[close])
     small = evaluation.a[close] < _NEAR_JUMP_OFF * lowest
     close, lowest = close[small], lowest[small]
+    law = law.select(close)
     R, a = sites.radius_of_curvature[close], evaluation.a[close]
     stable = np.maximum(evaluation.approach, jump_off_approach)[close]
     change = radius_slope(law, a, R, stable, jump_off_approach[close]) * step[close]

@@ -81,6 +81,8 @@ class Sites:
     ----------
     position : (n, 2) float, positions of the asperities, or the centres of unions, m.
     height, radius_of_curvature : (n,) float, heights and radii of curvature of asperities and unions, m.
+    contact_radius : (n,) float, contact radii in the last equilibrium, m, zero out of contact; for new spots, radii
+        from which the edges advance or recede.
     jump_off_approach : (n,) float, lowest approaches with a stable state of contact, m; below them spots break contact.
     asperity : (n,) int, index of the asperity; -1 for a union.
     members : (n,) int, number of asperities united in the spot; asperities that the spot only covers do not count.
@@ -99,6 +101,7 @@ class Sites:
     position: np.ndarray
     height: np.ndarray
     radius_of_curvature: np.ndarray
+    contact_radius: np.ndarray
     jump_off_approach: np.ndarray
     asperity: np.ndarray
     members: np.ndarray
@@ -137,11 +140,12 @@ class Sites:
         """Return a table with k more sites; the response of each is -1 at first.
 
         status, counts_as_old, split_number : one value for all new sites.
-        more : position, height, radius_of_curvature, asperity, members, union and approach, arrays of k rows.
+        more : position, height, radius_of_curvature, contact_radius, asperity, members, union and approach, arrays of
+            k rows; contact_radius is at least that of an advancing edge at jump-off.
         """
         count = len(more["height"])
         more |= {
-            "jump_off_approach": law.jump_off_approach(more["radius_of_curvature"]),
+            "jump_off_approach": law.lowest_approach(more["radius_of_curvature"], more["contact_radius"]),
             "split_number": np.full(count, split_number),
             "status": np.full(count, status, dtype=np.int8),
             "response": np.full(count, -1.0),
@@ -192,6 +196,7 @@ class Spots:
     position : (m, 2) float, centres of the spots, m.
     height, radius_of_curvature, contact_radius, approach : (m,) float, one value for each spot, m.
     members : (m,) int, number of asperities in each spot.
+    law : law of the spots in their states.
     """
 
     position: np.ndarray
@@ -200,6 +205,7 @@ class Spots:
     contact_radius: np.ndarray
     approach: np.ndarray
     members: np.ndarray
+    law: JKR
 
     def __len__(self) -> int:
         """Return the number of spots."""
@@ -214,24 +220,26 @@ class ContactState:
     ----------
     separation : mean separation u, m.
     sites : table of n sites.
-    contact_radius : (n,) float, contact radius of each site, zero out of contact, m.
+    law : law of the sites in their states.
     site_of_asperity : (asperities,) int, site in contact to which an asperity belongs: its own spot, a union that
         contains it, or a spot that covered it when it made contact; -1 for asperities out of contact and candidates.
     last_approach : (asperities,) float, last computed approach of each asperity out of contact, m.
     last_separation : (asperities,) float, mean separation for `last_approach`, m; inf if the approach is not known.
     residual : largest error of the equations of equilibrium, in h_rms.
     barred_count : number of asperities above jump-in that are barred because they broke contact in the last search.
+    receded_area : area over which the edges of all spots have receded on the path up to this state, m^2.
     history : events of the path up to this state, one `Events` for each equilibrium with events.
     """
 
     separation: float
     sites: Sites
-    contact_radius: np.ndarray
+    law: JKR
     site_of_asperity: np.ndarray
     last_approach: np.ndarray
     last_separation: np.ndarray
     residual: float = 0.0
     barred_count: int = 0
+    receded_area: float = 0.0
     history: tuple[Events, ...] = ()
 
     @cached_property
@@ -242,6 +250,6 @@ class ContactState:
     @cached_property
     def spots(self) -> Spots:
         """Properties of the sites in contact."""
-        names = ("position", "height", "radius_of_curvature", "approach", "members")
+        names = ("position", "height", "radius_of_curvature", "contact_radius", "approach", "members")
         columns = {name: getattr(self.sites, name)[self.contact_index] for name in names}
-        return Spots(contact_radius=self.contact_radius[self.contact_index], **columns)
+        return Spots(law=self.law.select(self.contact_index), **columns)

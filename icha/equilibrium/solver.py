@@ -100,7 +100,8 @@ def apply_events(state: IterationState, evaluation: Evaluation, margin: float) -
     area is in contact.
     """
     contact = state.contact
-    area = pressure_or_area_fraction(contact, AREA_FRACTION, evaluation.a, state.sites.radius_of_curvature)
+    R = state.sites.radius_of_curvature
+    area = pressure_or_area_fraction(contact, evaluation.law, AREA_FRACTION, evaluation.a, R)
     if area > _FULL_CONTACT:
         raise FullContact(f"the contact area reached {area:.2f} of the nominal area, above the limit {_FULL_CONTACT}")
     state = state.with_approach(evaluation.approach)
@@ -158,17 +159,22 @@ def _build_contact_state(state, evaluation, control):
     response = solve_response(Equations(contact, state.sites, control), evaluation)
     if not contact.adhesive:
         state = _update_candidates(state, evaluation)
-    sites = replace(state.sites, approach=evaluation.approach, response=response)
-    events = state.events()
+    touching, events = state.sites.status == CONTACT, state.events()
+    state = state.with_radii(touching, evaluation.a[touching])
+    radius = np.where(touching, evaluation.a, 0.0)
+    lowest = contact.law.lowest_approach(state.sites.radius_of_curvature, radius)
+    found = {"approach": evaluation.approach, "response": response}
+    sites = replace(state.sites, contact_radius=radius, jump_off_approach=lowest, **found)
     return ContactState(
         separation=evaluation.separation,
         sites=sites,
-        contact_radius=np.where(sites.status == CONTACT, evaluation.a, 0.0),
+        law=evaluation.law,
         site_of_asperity=state.site_of_asperity,
         last_approach=state.last_approach,
         last_separation=state.last_separation,
         residual=float(np.max(np.abs(evaluation.error), initial=0.0)) / contact.rms_height,
         barred_count=state.barred_count,
+        receded_area=state.receded_area,
         history=(*history, events) if len(events) else history,
     )
 

@@ -36,6 +36,7 @@ def merge_overlapping(state: IterationState, evaluation: Evaluation, margin=0.0,
     # A candidate in a pair makes contact before it becomes part of the union.
     candidates = pairs[sites.status[pairs] == CANDIDATE]
     state = state.with_events(JUMP_IN, sites.position[candidates], 1, 0.0, sites.asperity[candidates])
+    state = state.with_radii(pairs, a[pairs])
     site_of_asperity = state.site_of_asperity.copy()
     site_of_asperity[sites.asperity[candidates]] = candidates
     members = sites.members[i] + sites.members[j]
@@ -51,10 +52,11 @@ def merge_overlapping(state: IterationState, evaluation: Evaluation, margin=0.0,
             position=centre,
             height=np.zeros(len(pairs)),
             radius_of_curvature=curvature,
+            contact_radius=radius,
             asperity=np.full(len(pairs), -1),
             members=members,
             union=unions,
-            approach=law.approach(radius, curvature),
+            approach=evaluation.law.unite(i, j, a, radius).approach(radius, curvature),
             status=CONTACT,
             counts_as_old=True,
         ),
@@ -128,11 +130,13 @@ def _split_union(state, site, a):
     site_of_asperity = np.where(merged, -1, state.site_of_asperity)
     for k, asperities in enumerate(union.asperities()):
         site_of_asperity[asperities] = len(sites) + k
-    state = state.with_events(SPLIT, sites.position[[site]], sites.members[[site]])
+    state = state.with_events(SPLIT, sites.position[[site]], sites.members[[site]]).with_radii(site, a)
+    R = union.columns["radius_of_curvature"]
     sites = sites.remove(site).append(
         law,
         **union.columns,
-        approach=law.approach(contact_radius, union.columns["radius_of_curvature"]),
+        contact_radius=np.maximum(contact_radius, law.jump_off_radius(R)),
+        approach=law.receding.approach(contact_radius, R),
         status=CONTACT,
         counts_as_old=True,
         split_number=np.max(sites.split_number) + 1,

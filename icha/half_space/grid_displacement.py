@@ -57,7 +57,7 @@ class DisplacementField:
 
     Attributes
     ----------
-    law : law of one spot.
+    law : law of the spots in their states.
     period : side of the square, m.
     grid : number of nodes along a side; this grid may be coarser than the grid of the surface.
     centres : (m, 2) float, centres of the spots, m.
@@ -142,7 +142,8 @@ class DisplacementField:
         a, R, alpha = self.contact_radius[spots], self.radius_of_curvature[spots], _CUT / reach
         order = np.arange(_MOMENTS)
         factorial = np.cumprod(np.maximum(order, 1))
-        moments = self.law.moments(a, R, _MOMENTS) * (0.25 * (alpha * a[:, None]) ** 2) ** order / factorial**2
+        moments = self.law.select(spots).moments(a, R, _MOMENTS)
+        moments *= (0.25 * (alpha * a[:, None]) ** 2) ** order / factorial**2
         return _Group(spots, reach, alpha, moments)
 
     @cached_property
@@ -186,9 +187,9 @@ class DisplacementField:
 
     def _evaluate_short_half(self, group, of_group, dy, dx):
         """Return the exact displacement minus the smooth half in windows of a group; `windows` yields the arguments."""
-        spot, r2 = group.spots[of_group], dy[:, None] ** 2 + dx**2
-        a, R = self.contact_radius[spot][:, None], self.radius_of_curvature[spot][:, None]
-        w = self.law.displacement(np.sqrt(r2), a, R)
+        spot, r2 = group.spots[of_group][:, None], dy[:, None] ** 2 + dx**2
+        a, R = self.contact_radius[spot], self.radius_of_curvature[spot]
+        w = self.law.select(spot).displacement(np.sqrt(r2), a, R)
         r2 *= group.alpha**2
         smooth = smooth_half(r2, group.moments[of_group])
         smooth *= group.alpha / (np.pi * self.law.material.contact_modulus)

@@ -53,7 +53,6 @@ class Interaction:
 
     Attributes
     ----------
-    law : law of one spot.
     half_space : half-space with a point at every spot.
     radius_of_curvature : (n,) float, radii of curvature of the spots, m.
     largest_radius : (n,) float, m: the list of exact pairs is complete for contact radii up to these values.
@@ -62,7 +61,6 @@ class Interaction:
     by_moments : three (k,) arrays, displacements by unit moments of the source; the exact displacements replace them.
     """
 
-    law: JKR
     half_space: PointHalfSpace
     radius_of_curvature: np.ndarray
     largest_radius: np.ndarray
@@ -72,7 +70,7 @@ class Interaction:
     by_moments: tuple
 
     @classmethod
-    def between(cls, law: JKR, half_space: PointHalfSpace, radius_of_curvature, largest_radius) -> Interaction:
+    def between(cls, half_space: PointHalfSpace, radius_of_curvature, largest_radius) -> Interaction:
         """Return the interaction and its exact pairs for contact radii up to `largest_radius`, (n,) array in m."""
         ewald = half_space.ewald
         later, earlier, r = half_space.pairs
@@ -85,24 +83,27 @@ class Interaction:
         target = np.concatenate([later[by_earlier], earlier[by_later], distant[0]])
         source = np.concatenate([earlier[by_earlier], later[by_later], distant[1]])
         by_moments = ewald.point_displacement(r)
-        return cls(law, half_space, radius_of_curvature, largest_radius, target, source, r, by_moments)
+        return cls(half_space, radius_of_curvature, largest_radius, target, source, r, by_moments)
 
-    def displacement(self, a):
-        """Return the displacement w (m) at each spot by all other spots and images; `a` contains the radii (m)."""
-        law, R, j = self.law, self.radius_of_curvature, self.source
+    def displacement(self, law: JKR, a):
+        """Return the displacement w (m) at each spot by all other spots and images.
+
+        law : law of the n spots in their states; a : (n,) float, contact radii, m.
+        """
+        R, j = self.radius_of_curvature, self.source
         moments = law.force(a, R), law.second_moment(a, R), law.fourth_moment(a, R)
-        exact = law.displacement(self.r, a[j], R[j])
+        exact = law.select(j).displacement(self.r, a[j], R[j])
         for moment, displacement in zip(moments, self.by_moments, strict=True):
             exact -= moment[j] * displacement
         return self.half_space.displacement(*moments) + np.bincount(self.target, exact, len(a))
 
-    def tangent(self, a) -> tuple[Callable, Callable]:
+    def tangent(self, law: JKR, a) -> tuple[Callable, Callable]:
         """Linearise the displacement around contact radii a, (n,) array in m; spots of radius zero do not change.
 
         Return two functions that compute changes of the displacement from changes of the radii, both (n,) arrays in m.
         The first function is exact. The second function has a relative error of about 1e-3 and is several times faster.
         """
-        law, R, half_space = self.law, self.radius_of_curvature, self.half_space
+        R, half_space = self.radius_of_curvature, self.half_space
         present = a > 0
         safe = np.where(present, a, 1.0)
         moments = [
@@ -113,7 +114,7 @@ class Interaction:
         j, r, target = self.source[counts], self.r[counts], self.target[counts]
         fields = [moment[j] * field[counts] for moment, field in zip(moments, self.by_moments, strict=True)]
         # Exact derivatives at the pairs, minus the fields of the forces (first array) or of all moments (second array).
-        beyond_forces = law.displacement_derivative(r, a[j], R[j]) - fields[0]
+        beyond_forces = law.select(j).displacement_derivative(r, a[j], R[j]) - fields[0]
         beyond_moments = beyond_forces - fields[1] - fields[2]
 
         def exact(da):
@@ -158,7 +159,7 @@ def displacement_at(
     close = np.flatnonzero(r <= _exact_window(a, ewald)[source])
     distant = _find_distant_pairs(tree, position, a, ewald)
     target, source, r = (np.append(x[close], y) for x, y in zip((target, source, r), distant, strict=True))
-    exact = law.displacement(r, a[source], R[source])
+    exact = law.select(source).displacement(r, a[source], R[source])
     for moment, displacement in zip(moments, ewald.point_displacement(r), strict=True):
         exact -= moment[source] * displacement
     w += np.bincount(target, exact, len(points))

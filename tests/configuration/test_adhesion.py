@@ -47,9 +47,11 @@ def test_works_of_adhesion_that_do_not_fit_are_refused(refused, energy, message)
     refused("", BY_CELLS | {ENERGY: energy}, message)
 
 
-def test_asperities_have_one_work_of_adhesion(refused):
-    for energy in ({"advancing": "30 mJ/m^2", "receding": "90 mJ/m^2"}, {"stripes": STRIPES}):
-        refused("", {ENERGY: energy}, "'asperities' have one work of adhesion, but 'soft' has several")
+def test_asperities_refuse_maps_alone(load, refused):
+    two = material_of(load({ENERGY: {"advancing": "30 mJ/m^2", "receding": "90 mJ/m^2"}}).campaign)
+    assert two.directed
+    for energy in ({"stripes": STRIPES}, {"advancing": {"stripes": STRIPES}, "receding": "90 mJ/m^2"}):
+        refused("", {ENERGY: energy}, "'asperities' have the same work of adhesion everywhere, but 'soft' has a map")
 
 
 @pytest.mark.parametrize("direction", [False, True])

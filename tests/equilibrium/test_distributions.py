@@ -36,7 +36,7 @@ def case(request):
 
 def spots_of(position, a):
     a = np.asarray(a, float)
-    return Spots(np.asarray(position, float), a * 0, a * 0 + 1, a, a * 0, np.ones(len(a), dtype=int))
+    return Spots(np.asarray(position, float), a * 0, a * 0 + 1, a, a * 0, np.ones(len(a), dtype=int), None)
 
 
 @pytest.mark.parametrize("grid", [16, 17])

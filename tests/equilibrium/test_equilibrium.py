@@ -224,17 +224,17 @@ def assert_consistent(contact, state):
     )
     a, R = spots.contact_radius, spots.radius_of_curvature
     half_space = PointHalfSpace.at(spots.position, period, law.material.contact_modulus)
-    w = Interaction.between(law, half_space, R, a).displacement(a)
+    w = Interaction.between(half_space, R, a).displacement(law, a)
     error = spots.approach + w + state.separation - spots.height
     # The sum over the spots alone is split otherwise than that over the sites of the solve.
     assert np.max(np.abs(error), initial=0) <= 2e-7 * contact.rms_height
     first, second, r = all_pairs(spots.position, period)
     # Only the two spots of one split may overlap, until the unloading ends.
-    split = state.sites.split_number[state.contact_radius > 0]
+    split = state.sites.split_number[state.sites.contact_radius > 0]
     together = (split[first] >= 0) & (split[first] == split[second])
     assert np.all((r >= spots.contact_radius[first] + spots.contact_radius[second]) | together)
     assert np.all(
-        np.isin(state.site_of_asperity[state.site_of_asperity >= 0], np.flatnonzero(state.contact_radius > 0))
+        np.isin(state.site_of_asperity[state.site_of_asperity >= 0], np.flatnonzero(state.sites.contact_radius > 0))
     )
     # Every spot has an owner, and no free asperity is left beyond its jump-in but the pending ones.
     assert set(spot_of_asperity(state)[spot_of_asperity(state) >= 0]) == set(range(len(spots)))

@@ -63,25 +63,24 @@ def test_displacement_is_the_plain_sum(energy, count, largest):
 def test_interaction_leaves_out_the_own_spot_alone(energy):
     position, a, R = spots(40)
     half_space = PointHalfSpace.at(position[:25], 1.0, MODULUS, free=True).extended(position[25:])
-    interaction = Interaction.between(law(energy), half_space, R, 1.2 * a)
+    interaction = Interaction.between(half_space, R, 1.2 * a)
     exact = direct_sum(position, position, a, R, energy, leave_out={(i, i) for i in range(40)})
-    np.testing.assert_allclose(interaction.displacement(a), exact, atol=1e-7 * np.max(np.abs(exact)), rtol=0)
+    w = interaction.displacement(law(energy), a)
+    np.testing.assert_allclose(w, exact, atol=1e-7 * np.max(np.abs(exact)), rtol=0)
     # One spot alone feels nothing, wherever it is.
     for place in ([0.0, 0.0], [0.5, 0.5], [0.9999, 0.2]):
-        alone = Interaction.between(
-            law(energy), PointHalfSpace.at(np.array([place]), 1.0, MODULUS, free=True), R[:1], a[:1]
-        )
-        assert abs(alone.displacement(a[:1])[0]) < 1e-10 * abs(jkr_approach(a[0], R[0], MODULUS, energy))
+        alone = Interaction.between(PointHalfSpace.at(np.array([place]), 1.0, MODULUS, free=True), R[:1], a[:1])
+        assert abs(alone.displacement(law(energy), a[:1])[0]) < 1e-10 * abs(jkr_approach(a[0], R[0], MODULUS, energy))
 
 
 @pytest.mark.parametrize("energy", ENERGIES)
 def test_tangent_is_the_derivative(energy):
     position, a, R = spots(30)
     half_space = PointHalfSpace.at(position, 1.0, MODULUS, free=True)
-    interaction = Interaction.between(law(energy), half_space, R, 1.5 * a)
+    one, interaction = law(energy), Interaction.between(half_space, R, 1.5 * a)
     change = 1e-5 * a * np.random.default_rng(2).normal(size=30)
-    difference = 0.5 * (interaction.displacement(a + change) - interaction.displacement(a - change))
-    tangent, approximate = interaction.tangent(a)
+    difference = 0.5 * (interaction.displacement(one, a + change) - interaction.displacement(one, a - change))
+    tangent, approximate = interaction.tangent(one, a)
     largest = np.max(np.abs(difference))
     np.testing.assert_allclose(tangent(change), difference, atol=1e-5 * largest, rtol=0)
     np.testing.assert_allclose(approximate(change), difference, atol=3e-3 * largest, rtol=0)
