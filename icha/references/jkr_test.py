@@ -36,8 +36,8 @@ _JUMP_OFF_SHARE = 0.5
 _CLEAR_TENSION = 4.0
 # Largest relative error of the force without a warning, by the curvature of the sphere and by the thickness of a layer.
 _FORCE_ERROR = 0.02
-# Largest force over the pull-off force, if indentations alone are measured. docs/estimates.md gives the share of
-# intervals that contain the truth at 10 and 20 times the pull-off force.
+# Largest force over the pull-off force without a warning. docs/estimates.md gives the share of intervals that contain
+# the truth at 10 and 20 times the pull-off force.
 _MOST_FORCE = 12.0
 # Neighbouring residuals are not random if their correlation exceeds the first number, and the second number divided by
 # the root of the number of points.
@@ -312,10 +312,10 @@ def _warnings(test, states, ranges, interaction_range, thickness, roughness) -> 
     if advancing * 1.5 * math.pi * test.radius < 1e-3 * ranges["force"]:
         yield "Hertz's law fits the points of loading: their work of adhesion is too small for these forces"
     pull_off = 1.5 * math.pi * test.radius * works["surface_energy"]
-    if "contact_radius" not in ranges and (force := float(test.measured["force"].max())) > _MOST_FORCE * pull_off > 0:
+    if (force := float(test.measured["force"].max())) > _MOST_FORCE * pull_off > 0:
         yield (
             f"the largest force is {force / pull_off:.0f} times the pull-off force: noise hides the adhesion, and the "
-            "intervals are too narrow; use smaller loads, or measure the contact radius"
+            "intervals are too narrow; use smaller loads"
         )
     if not unloading.any() and test.indentation_offset:
         yield "without unloading, the offset of the indentation is hardly distinguishable from adhesion"

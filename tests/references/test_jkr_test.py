@@ -162,8 +162,8 @@ def test_limits_of_the_law_are_warnings(options, changes, message):
         icha.fit_jkr_test(table, changes.get("radius", RADIUS), **options)
 
 
-@pytest.mark.parametrize(("ratio", "column", "warned"), [(8, 1, False), (30, 1, True), (30, 0, False)])
-def test_loads_far_above_pull_off_need_contact_radii(ratio, column, warned):
+@pytest.mark.parametrize(("ratio", "column", "warned"), [(8, 0, False), (8, 1, False), (30, 0, True), (30, 1, True)])
+def test_loads_far_above_pull_off_are_a_warning(ratio, column, warned):
     states = exact_test(load=ratio * 1.5 * math.pi * 0.09 * RADIUS)
     table = noisy_test(states, np.random.default_rng(1), COLUMNS[column:][:1])
     test = icha.fit_jkr_test(table, RADIUS, indentation_offset=0.0)
