@@ -1,22 +1,26 @@
 """Random loops by boundary elements: each one must end where it was asked to end.
 
-python -m validation.random_loops [--count N] [--first K] [--indenters]
+python -m validation.random_loops [--count N] [--first K] [--indenters] [--works]
 
 Smooth, elliptic and rough surfaces and plateaus, half of them sticky, under control of separation, load or area. With
 `--indenters`: spheres, paraboloids, cones and waves with roughness on a free half-space, under control of separation or
-load. A target may lie inside a jump, where there is no equilibrium; any other failure is one of the solver.
+load. With `--works`: small loops of both kinds, whose work of adhesion is 1.2 to 4 times larger for receding edges; two
+of three have a map, stripes or random patches. Their loss must be at least the energy that receding edges dissipate. A
+target may lie inside a jump, where there is no equilibrium; any other failure is one of the solver.
 """
 
 import argparse
 import math
 import time
 import warnings
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
+from icha.asperity.adhesion_map import Patches, Stripes
 from icha.contact.models import REFERENCE_MODEL
 from icha.surfaces.shapes import Cone, Paraboloid, Sphere, Wave
 from validation.surfaces import bump
@@ -24,6 +28,11 @@ from validation.surfaces import bump
 INDENTERS = ("sphere", "paraboloid", "cone", "wave")
 KINDS = ("bump", "ellipse", "rough", "rough", "plateau")
 _PERIOD, _MODULUS, _RADIUS = 100e-6, 25e6, 1e-3
+# Cells along the sides of periodic and of free squares with two works of adhesion.
+_PERIODIC, _FREE = 32, 24
+# Largest shortfall of the loss compared with the dissipation of receding edges, divided by this dissipation, or by the
+# work of loading, because the loss is the difference of two integrals.
+_OF_DISSIPATION, _OF_WORK = 1e-2, 1e-4
 
 
 class Loop(NamedTuple):
@@ -74,10 +83,11 @@ def random_loop(number: int, grid: int | None = None) -> Loop:
     return Loop(kind, control, surface, material, path)
 
 
-def random_indenter(number: int) -> Loop:
+def random_indenter(number: int, grid: int | None = None) -> Loop:
     """Draw a loop of a rough indenter by its number; every other one is sticky."""
     rng = np.random.default_rng(5000 + number)
-    grid, kind = int(rng.choice([48, 64, 96], p=[0.4, 0.4, 0.2])), INDENTERS[number % 4]
+    drawn, kind = int(rng.choice([48, 64, 96], p=[0.4, 0.4, 0.2])), INDENTERS[number % 4]
+    grid = grid or drawn
     spacing, sticky = _PERIOD / grid, (number // 4) % 2 == 0
     # Radius (dgamma R^2/E*)^(1/3) and unit of length (dgamma^2 R/E*^2)^(1/3) of a sphere with adhesion.
     radius = float(rng.uniform(2, min(6, grid / 12))) * spacing
@@ -104,14 +114,36 @@ def random_indenter(number: int) -> Loop:
     return Loop(kind, "load", surface, material, path)
 
 
+def random_works(number: int) -> Loop:
+    """Draw a loop with two works of adhesion, most of them with a map; even numbers are periodic, odd ones free."""
+    half, rng = number // 2, np.random.default_rng(9000 + number)
+    loop = random_indenter(half, _FREE) if number % 2 else random_loop(half, _PERIODIC)
+    energy, contrast = loop.material.surface_energy, float(rng.uniform(0.1, 0.5))
+    if not energy:
+        return loop
+    places = (
+        None,
+        Stripes((1 - contrast) * energy, (1 + contrast) * energy, _PERIOD / int(rng.choice([4, 6, 8])), "xy"[half % 2]),
+        Patches(energy, contrast * energy / 2, _PERIOD / float(rng.uniform(4, 10)), int(rng.integers(1000))),
+    )[half % 3]
+    material = replace(loop.material, receding_energy=energy * float(rng.uniform(1.2, 4)), adhesion_map=places)
+    name = "one value" if places is None else type(places).__name__.lower()
+    return loop._replace(kind=f"{loop.kind}, {name}", material=material)
+
+
 def follow_loop(loop: Loop) -> str:
-    """Follow a loop; return an empty text, or why it ended before its end."""
+    """Follow a loop; return an empty text, or why it ended before its end or lost less than its edges dissipate."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            simulate(loop.surface, loop.material, loop.path, model=REFERENCE_MODEL)
+            run = simulate(loop.surface, loop.material, loop.path, model=REFERENCE_MODEL)
         except ConvergenceError as error:
             return "" if "lies inside a jump" in str(error) else str(error)
+    loss, dissipation = float(run.hysteresis_loss), float(run.front_dissipation)
+    loading = run.leg.values == run.leg.values.min()
+    work = abs(float(np.trapezoid(run.nominal_pressure.values[loading], run.mean_separation.values[loading])))
+    if dissipation - loss > max(_OF_DISSIPATION * dissipation, _OF_WORK * work):
+        return f"loses {loss / dissipation:.3f} times the energy that receding edges dissipate"
     return ""
 
 
@@ -121,8 +153,9 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=300)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--indenters", action="store_true", help="rough indenters on a free half-space")
+    parser.add_argument("--works", action="store_true", help="small loops with two works of adhesion and maps")
     options = parser.parse_args()
-    failed, draw = 0, random_indenter if options.indenters else random_loop
+    failed, draw = 0, random_works if options.works else random_indenter if options.indenters else random_loop
     for number in range(options.first, options.first + options.count):
         loop, clock = draw(number), time.process_time()
         with threadpool_limits(1):

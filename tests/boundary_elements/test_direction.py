@@ -7,6 +7,7 @@ from icha import Material, Path, SelfAffineSpectrum, Surface, simulate
 from icha.boundary_elements.laws import DirectedBonds, LinearBonds
 from icha.references.indentation import sphere_contact
 from icha.surfaces.shapes import Sphere
+from validation.random_loops import follow_loop, random_works
 
 MODULUS, RADIUS, ADVANCING = 2e6, 1e-3, 0.03
 MODEL = "boundary_elements"
@@ -115,3 +116,9 @@ def test_fronts_of_a_rough_surface_dissipate_at_a_short_and_at_a_finite_range(in
     assert front > 0.9 * ADVANCING * area
     assert float(run["hysteresis_loss"]) > 0.99 * front
     assert not run.attrs.get("failed_checks") and not run.attrs.get("failed_loss_checks")
+
+
+@pytest.mark.parametrize("number", [11, 14])
+def test_random_loops_lose_what_their_receding_edges_dissipate(number):
+    """All of them are run by `python -m validation.random_loops --works`; these have a map."""
+    assert follow_loop(random_works(number)) == ""
