@@ -6,7 +6,7 @@ import compared_campaign as compared
 import numpy as np
 
 from icha.datasets.labels import RunLabels
-from icha.support.distributions import Distribution
+from icha.uncertainty.distributions import Distribution
 
 COUNT = 64
 HURST, ENERGY = Distribution("uniform", 0.5, 0.9), Distribution("lognormal", 0.05, 1.3)

@@ -21,7 +21,7 @@ import numpy as np
 from scipy.stats import t as students_t
 
 import icha
-from icha.analysis.control_variates import PROBABILITY, estimate_quantity
+from icha.uncertainty.control_variates import PROBABILITY, estimate_quantity
 from validation.tables import Table, write_tables
 
 FILE = Path("results/answers.csv")

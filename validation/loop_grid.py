@@ -22,7 +22,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 import icha
-from icha.analysis.grid_error import LEAST_MEASURED, LOOP_ERRORS, AreaError, LoopError
+from icha.uncertainty.grid_error import LEAST_MEASURED, LOOP_ERRORS, AreaError, LoopError
 from validation.tables import Table, percent, write_tables
 
 RESULTS = Path(__file__).resolve().parent / "results/loop_grid.json"

@@ -1,1 +1,1 @@
-"""Analysis of finished runs: comparison at common loads, errors of the asperity model, checks, range of validity."""
+"""Analysis of finished runs: comparison at common loads, errors of the asperity model, checks of campaigns."""

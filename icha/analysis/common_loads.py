@@ -7,14 +7,14 @@ import numpy as np
 import xarray as xr
 from scipy.interpolate import PchipInterpolator
 
-from icha.analysis.left_out import too_few
 from icha.datasets.attributes import DERIVED, combine_attributes
 from icha.datasets.build import make_variable
 from icha.datasets.campaign import loading_stops, reduced_gap
 from icha.datasets.labels import LABELS
 from icha.datasets.variables.campaign import COMPUTED_RUNS, LOADED_RUNS, MISSING
 from icha.datasets.variables.terms import TERMS, Variable
-from icha.support.statistics import ensemble
+from icha.uncertainty.ensembles import ensemble
+from icha.uncertainty.left_out import too_few
 
 # Number of loads per decade at which curves are compared.
 _POINTS_PER_DECADE = 8
@@ -81,14 +81,14 @@ def compare_runs(study: xr.Dataset) -> xr.Dataset:
 
     - `contact_area_fraction` and `reduced_separation` along the labels of the runs;
     - the mean of both variables over the seeds, the standard deviation, and half the width of the 95 % confidence
-      interval (`area_mean`, `area_deviation`, `area_confidence`, `separation_mean`, …; `icha.support.statistics`);
+      interval (`area_mean`, `area_deviation`, `area_confidence`, `separation_mean`, …; `icha.uncertainty.ensembles`);
     - `material_spread` and `slope_spread`: largest area of all materials or slopes divided by the smallest, minus 1.
 
     Incomplete runs (`status`) have no values and do not contribute to means. Runs that left the range of the model have
     values up to the limit of the model. Runs for which the asperity model is not applicable have values, but do not
     contribute to means. `seed_count` is the number of seeds in the means, `asked_seed_count` the number of requested
     seeds. For a single seed, standard deviation and confidence interval are missing. The confidence interval is also
-    missing if more than a tenth of the requested seeds is (`icha.analysis.left_out`).
+    missing if more than a tenth of the requested seeds is (`icha.uncertainty.left_out`).
     """
     status = study["status"].transpose(*LABELS).values
     loaded, asked = np.isin(status, LOADED_RUNS), np.isin(status, (*COMPUTED_RUNS, MISSING))

@@ -24,7 +24,7 @@ from icha.datasets.variables.model_error import ASKED, BINS, MODEL_ERROR
 from icha.datasets.variables.terms import MATERIAL, Variable
 from icha.equilibrium.distributions import cover_grid
 from icha.path.targets import REDUCED_PRESSURE
-from icha.support.statistics import ensemble
+from icha.uncertainty.ensembles import ensemble
 
 _TITLE = "Error of the model against boundary elements"
 _SUMMARY = "Results of the model and of boundary elements for the same topographies, loads and materials."

@@ -21,10 +21,10 @@ def answer(
     of three levels of accuracy, which together need less time than boundary elements for every seed. With the key
     `accuracy`, `icha run` chooses these seeds.
     """
-    from icha.analysis.sensitivity import left_out_of_samples
     from icha.datasets.files import read_campaign
     from icha.datasets.results import ANSWERS, SENSITIVITY
     from icha.report.answers import answers_of, answers_table, samples_table, sentences
+    from icha.uncertainty.sensitivity import left_out_of_samples
 
     folder = Path(results)
     if folder.name == results and not folder.is_dir():

@@ -262,9 +262,9 @@ def _print_checks(campaign, results: Path) -> None:
     import xarray as xr
 
     from icha.analysis.checks import read_checks
-    from icha.analysis.measured_error import statements_on_results
     from icha.datasets.files import read_campaign
     from icha.planning.results import campaign_files
+    from icha.report.validity import statements_on_results
 
     files = campaign_files(campaign, str(results))
     checks = read_checks(files.checks)

@@ -80,10 +80,10 @@ def _campaign(tree) -> Iterator[str]:
     """Yield, for each study of a campaign, its size, models, number of failed runs and ranges of results."""
     from xarray import Dataset
 
-    from icha.analysis.left_out import left_out_of_study
     from icha.datasets.attributes import reasons_not_applicable
     from icha.datasets.labels import LABELS
     from icha.datasets.variables.campaign import LOADED_RUNS, STATUS_MEANINGS
+    from icha.uncertainty.left_out import left_out_of_study
 
     yield " ".join(str(tree.attrs.get("summary", "")).split())
     for name, node in tree.children.items():

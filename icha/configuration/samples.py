@@ -7,9 +7,9 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, WithJsonSchema, create_model, model_validator
 
 from icha.configuration.surfaces import SURFACE_KINDS, MaterialSection
-from icha.support.distributions import KINDS, Distribution
 from icha.support.rules import SLOPE, FloatRange, IntegerRange
 from icha.support.values import Problem, Section, Seed, integer, rule_of, to_number, to_si
+from icha.uncertainty.distributions import KINDS, Distribution
 
 _EXPECTED = (
     "expected a range [low, high], or one of {uniform: [low, high]}, {loguniform: [low, high]}, "

@@ -26,7 +26,7 @@ from icha.figures.looks import (
 from icha.figures.select import NothingToDraw, has_layer, has_shape, select_snapshots, snapshot_label
 from icha.figures.style import BLACK, GREY, TWO_COLUMNS, in_style, logarithmic_axes, new_panels, slope_label
 from icha.support.formatting import choose_unit
-from icha.support.statistics import ENOUGH
+from icha.uncertainty.ensembles import ENOUGH
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -74,7 +74,7 @@ def only_spheres(study: xr.Dataset) -> str:
 
 def grid_of_loops(campaign: xr.DataTree, studies: Sequence[str]) -> str:
     """Return a sentence on the error of loops by boundary elements due to the grid; "" without such loops."""
-    from icha.analysis.grid_error import cells_of_loops, describe_loops
+    from icha.uncertainty.grid_error import cells_of_loops, describe_loops
 
     loops = cells_of_loops(campaign, studies)
     return f"Grid: {describe_loops(loops)}." if loops else ""
@@ -92,9 +92,9 @@ def count_runs(
     models : names of the models that the figure shows; empty if they are not known.
     of_loss : True if the figure shows losses, which runs that failed checks of their loss do not have.
     """
-    from icha.analysis.left_out import absent_materials, left_out_of_study
-    from icha.analysis.sensitivity import left_out_of_samples
     from icha.datasets.variables.campaign import LOADED_RUNS
+    from icha.uncertainty.left_out import absent_materials, left_out_of_study
+    from icha.uncertainty.sensitivity import left_out_of_samples
 
     found: list[str] = []
     for name in studies:

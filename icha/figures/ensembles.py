@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.analysis.left_out import too_few
 from icha.datasets.labels import RunLabels
 from icha.figures.drawn import Name, count_seeds, record, say
 from icha.figures.looks import FEWER_SEEDS
 from icha.figures.select import ContactRuns
 from icha.figures.style import GREY, legend_handle
-from icha.support.statistics import ENOUGH, ensemble
+from icha.uncertainty.ensembles import ENOUGH, ensemble
+from icha.uncertainty.left_out import too_few
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

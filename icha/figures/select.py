@@ -171,7 +171,7 @@ def is_applicable(run: xr.Dataset) -> bool:
 
 def is_good_loop(run: xr.Dataset, variable: str = "hysteresis_loss") -> bool:
     """Return False if a model is not applicable to a run that unloads, or its grid too coarse for pull-off or loss."""
-    from icha.analysis.grid_error import LOOP_ERRORS, cells_of_length
+    from icha.uncertainty.grid_error import LOOP_ERRORS, cells_of_length
 
     least = LOOP_ERRORS[variable].least_cells
     coarse = run.attrs.get("contact_model") == REFERENCE_MODEL and cells_of_length(run) < least

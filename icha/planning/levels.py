@@ -14,8 +14,6 @@ import numpy as np
 import xarray as xr
 import yaml
 
-from icha.analysis.allocation import LEVELS, allocate, half_width_of_seeds, nest, variances_per_seed
-from icha.analysis.estimates import estimate_campaign
 from icha.configuration.campaign import Campaign
 from icha.configuration.studies import Accuracy, Study
 from icha.contact.models import DEFAULT_MODEL
@@ -28,6 +26,9 @@ from icha.planning.plan import RUNS, plan
 from icha.planning.results import campaign_files
 from icha.support.atomic_files import whole_file
 from icha.support.formatting import format_count
+from icha.uncertainty.allocation import allocate, half_width_of_seeds, nest, variances_per_seed
+from icha.uncertainty.control_variates import LEVELS, SEEDS
+from icha.uncertainty.estimates import estimate_campaign
 
 # If the accuracy exceeds the budget, it is increased by this factor until the budget suffices.
 _WIDER = 1.05
@@ -113,14 +114,14 @@ def choose_for_study(name: str, study: Study, estimates, costs: Mapping[str, flo
     accuracy = study.accuracy
     quantity, required = quantity_of(accuracy, study), accuracy.half_width
     answers = [_answers(estimate, name, quantity) for estimate in estimates]
-    present = {level: len(getattr(study.seeds_of_levels, level) or ()) for level in LEVELS}
+    present = {level: len(getattr(study.seeds_of_levels, level) or ()) for level in SEEDS}
     if answers[0] is None or not answers[0]["fine_seeds"].all():
         reason = f"no run has a result for {quantity}; look at the runs that ended early"
         return Choice(quantity, math.inf, required, {}, 0.0, reason)
     left_out = _left_out(answers[0])
     if not _has_estimates(answers[0]):
         # Too few seeds have results. As many seeds are added as failed, and the accuracy is known afterwards.
-        used = {level: int(answers[0][name].min()) for level, name in LEVELS.items()}
+        used = {level: int(answers[0][name].min()) for level, name in SEEDS.items()}
         counts = nest({level: 2 * count - used[level] for level, count in present.items() if count})
         return Choice(quantity, math.inf, required, counts, _seconds(costs, counts), "", left_out)
     half_width = half_width_of_seeds(answers[0])
@@ -187,9 +188,8 @@ def _least_cost(
 
 
 def words_of_levels(counts: Mapping[str, int]) -> str:
-    """Return numbers of seeds in words, such as `8 seeds of asperities, 4 seeds of fine boundary elements`."""
-    words = {"asperities": "asperities", "coarse": "coarse boundary elements", "fine": "fine boundary elements"}
-    return ", ".join(f"{format_count(count, 'seed')} of {words[level]}" for level, count in counts.items())
+    """Return numbers of seeds in words, such as `8 seeds of the asperity model, 4 seeds of boundary elements`."""
+    return ", ".join(f"{format_count(count, 'seed')} of {LEVELS[level]}" for level, count in counts.items())
 
 
 def write_levels(results: Path, choices: Mapping[str, Choice]) -> None:

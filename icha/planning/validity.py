@@ -3,9 +3,20 @@
 import math
 from functools import cache
 
-from icha.analysis.grid_error import length_in_cells
-from icha.analysis.validity import (
-    COMPLETE,
+from icha.asperity.full_contact import gaussian_complete_pressure
+from icha.asperity.material import VAN_DER_WAALS_RANGE, WU_HOLDS_FROM
+from icha.asperity.stickiness import stickiness, sticky_rms_height
+from icha.asperity.tabor import describe_short_range
+from icha.configuration.campaign import Campaign
+from icha.configuration.cases import run_cases
+from icha.configuration.plausibility import energy_ratio, resolution_of_smooth, rms_curvature, tabor_parameter
+from icha.configuration.surfaces import SelfAffineSurface
+from icha.configuration.topographies import read_surface
+from icha.contact.attraction import straight_strength
+from icha.contact.models import MODELS
+from icha.datasets.labels import is_derived_study
+from icha.planning.statements import (
+    COMPLETE_PRESSURE,
     DIRECTION,
     RESOLVED,
     RMS_HEIGHT,
@@ -19,22 +30,9 @@ from icha.analysis.validity import (
     Statement,
     describe_layers,
     describe_sticky,
-    join_first,
     statements,
 )
-from icha.asperity.full_contact import gaussian_complete_pressure
-from icha.asperity.material import VAN_DER_WAALS_RANGE, WU_HOLDS_FROM
-from icha.asperity.stickiness import stickiness, sticky_rms_height
-from icha.asperity.tabor import describe_short_range
-from icha.configuration.campaign import Campaign
-from icha.configuration.cases import run_cases
-from icha.configuration.plausibility import energy_ratio, resolution_of_smooth, rms_curvature, tabor_parameter
-from icha.configuration.surfaces import SelfAffineSurface
-from icha.configuration.topographies import read_surface
-from icha.contact.attraction import straight_strength
-from icha.contact.models import MODELS
-from icha.datasets.labels import is_derived_study
-from icha.support.formatting import format_quantity
+from icha.support.formatting import format_quantity, join_first
 from icha.surfaces.moments import (
     SpectralMoments,
     height_statistics,
@@ -43,6 +41,7 @@ from icha.surfaces.moments import (
     spectral_moments,
     summit_density,
 )
+from icha.uncertainty.grid_error import length_in_cells
 
 # Least number of cells in the contact radius at zero load for a pull-off force within a per cent (docs/indenter.md).
 _LEAST_CELLS = 10
@@ -64,8 +63,8 @@ def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
 
     Returns
     -------
-    The properties in `icha.analysis.validity.VALIDATED`, and three others. `summits` is the number of summits that the
-    asperity model uses. `rms_height` is the rms height, m. `complete_contact_pressure` is the pressure of complete
+    The properties in `icha.planning.statements.VALIDATED`, and three others. `summits` is the number of summits that
+    the asperity model uses. `rms_height` is the rms height, m. `complete_contact_pressure` is the pressure of complete
     contact, divided by E*; it is estimated for random surfaces.
     """
     section = campaign.surfaces[name]
@@ -94,7 +93,7 @@ def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
         "free_edges": float(free),
         "summits": summits,
         RMS_HEIGHT: math.sqrt(moments.m0 / (2 * moments.m2)),
-        COMPLETE: complete,
+        COMPLETE_PRESSURE: complete,
     }
 
 
@@ -130,7 +129,7 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
             "full_contact_energy_ratio": energy_ratio(campaign, case),
             DIRECTION: material.receding.surface_energy / material.surface_energy if material.surface_energy else 1.0,
             SHAPED: float(campaign.surfaces[case.surface].shape is not None),
-            COMPLETE: facts[COMPLETE] * case.rms_slope * material.contact_modulus,
+            COMPLETE_PRESSURE: facts[COMPLETE_PRESSURE] * case.rms_slope * material.contact_modulus,
             STRENGTH: material.receding.interface_strength,
             THEORETICAL: material.receding.theoretical_strength,
             **range_of_attraction,

@@ -8,20 +8,15 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from icha.analysis.control_variates import PROBABILITY, quantile
-from icha.analysis.estimates import LOOP
-from icha.analysis.sensitivity import response_words
 from icha.datasets.quantities import quantity, state_words
 from icha.path.targets import OF_SQUARES, PER_NOMINAL_AREA
 from icha.report.tables import Table
-from icha.support.distributions import KINDS
 from icha.support.formatting import format_quantity
+from icha.uncertainty.control_variates import LEVELS, PROBABILITY, SEEDS, quantile, share_of_levels
+from icha.uncertainty.distributions import KINDS
+from icha.uncertainty.estimates import LOOP
+from icha.uncertainty.sensitivity import response_words
 
-_LEVELS = {
-    "asperity_seeds": "the asperity model",
-    "coarse_seeds": "boundary elements on half the grid",
-    "fine_seeds": "boundary elements",
-}
 # Largest ratio of half-width and absolute value of an interval that is printed with ±. Wider intervals need not be
 # symmetric, so their ends are printed.
 _WIDE = 0.3
@@ -93,7 +88,7 @@ class Answer(NamedTuple):
 
 
 def answers_of(study: xr.Dataset) -> list[Answer]:
-    """Return the answers of a study; `study` is a group of the dataset of `icha.analysis.estimates`.
+    """Return the answers of a study; `study` is a group of the dataset of `icha.uncertainty.estimates`.
 
     For surfaces that are single squares, such as lenses, quantities per nominal area are left out.
     """
@@ -133,10 +128,8 @@ def _limit(row, shares):
     """Return a sentence on what limits the accuracy, and how the interval would narrow with twice as many seeds."""
     if math.isnan(float(row["estimate_low"])):
         return "The runs that are left out limit the accuracy."
-    levels = [level for level in _LEVELS if row[level]]
-    # The cheapest level has the scatter of the seeds, and each further level that of its difference from the last one.
-    causes = ["seeds", "model" if levels[0] == "asperity_seeds" else "refinement", "refinement"]
-    variances = {level: shares[cause] ** 2 for level, cause in zip(levels, causes, strict=False)}
+    causes = share_of_levels([level for level, name in SEEDS.items() if row[name]])
+    variances = {level: shares[cause] ** 2 for level, cause in causes.items()}
     variances |= {cause: 0.0 if math.isnan(shares[cause]) else shares[cause] ** 2 for cause in ("grid", "inputs")}
     total, level = sum(variances.values()), max(variances, key=variances.__getitem__)
     if not total:
@@ -149,12 +142,12 @@ def _limit(row, shares):
         )
     if level == "grid":
         return f"The grid limits the accuracy: {width}. A finer grid would narrow it."
-    seeds, freedom = int(row[level]), float(row["degrees_of_freedom"])
+    seeds, freedom = int(row[SEEDS[level]]), float(row["degrees_of_freedom"])
     of_more = quantile(freedom * (2 * seeds - 1) / max(seeds - 1, 1)) / quantile(freedom)
     narrower = 1 - of_more * math.sqrt((total - variances[level] / 2) / total)
     unknown = " The error of the grid is unknown." if math.isnan(shares["grid"]) else ""
     return (
-        f"The {seeds} seeds of {_LEVELS[level]} limit the accuracy: with twice as many, the interval would "
+        f"The {seeds} seeds of {LEVELS[level]} limit the accuracy: with twice as many, the interval would "
         f"be {100 * narrower:.0f} % narrower.{unknown}"
     )
 

@@ -14,8 +14,6 @@ from pathlib import Path
 
 import xarray as xr
 
-from icha.analysis.measured_error import statements_on_results
-from icha.analysis.sensitivity import left_out_of_samples
 from icha.checks.findings import Check
 from icha.contact.models import MODEL_PAPER
 from icha.datasets.results import figure_number
@@ -31,7 +29,9 @@ from icha.report.tables import (
     surfaces_table,
 )
 from icha.report.template import write_page
+from icha.report.validity import statements_on_results
 from icha.support.formatting import format_count
+from icha.uncertainty.sensitivity import left_out_of_samples
 
 SOFTWARE = ("icha", "numpy", "scipy", "finufft", "xarray", "netCDF4", "matplotlib", "snakemake")
 FOLDED_ROWS, MOST_ROWS = 30, 300  # largest number of rows of a table that is not folded, and that is not cut
@@ -62,8 +62,8 @@ def write_report(
         and links to the other files.
     checks : results of `icha.analysis.checks.check_campaign`.
     model_error : result of `icha.analysis.model_error.model_error`; None for a campaign without boundary elements.
-    answers : result of `icha.analysis.estimates.estimate_campaign`; None without answers.
-    sensitivity : result of `icha.analysis.sensitivity.sensitivity_of_campaign`; None without sampled parameters.
+    answers : result of `icha.uncertainty.estimates.estimate_campaign`; None without answers.
+    sensitivity : result of `icha.uncertainty.sensitivity.sensitivity_of_campaign`; None without sampled parameters.
     surfaces : datasets of the surfaces, with or without heights, for statistics and power spectra.
     configuration : text of the configuration as used.
     files : files to which the page links, by their titles; the first file is the campaign dataset.

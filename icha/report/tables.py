@@ -12,7 +12,6 @@ import xarray as xr
 from markupsafe import Markup
 
 from icha.analysis.checks import worst
-from icha.analysis.left_out import left_out_of_study
 from icha.checks.findings import Check
 from icha.contact.models import MODELS
 from icha.datasets.campaign import run_place, runs_of_status
@@ -22,6 +21,7 @@ from icha.datasets.surface_file import measured_scale
 from icha.datasets.variables.campaign import BEYOND_MODEL, COMPUTED_RUNS, FAILED_RUNS, LOADED_RUNS, MISSING
 from icha.report.template import format_symbols
 from icha.support.formatting import format_quantity, printable
+from icha.uncertainty.left_out import left_out_of_study
 
 _COUNTED = {
     "requested": (*COMPUTED_RUNS, MISSING),

@@ -11,7 +11,7 @@ from icha.datasets.campaign import reduced_gap
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import LABELS, RunLabels
 from icha.figures.select import path_steps
-from icha.support.statistics import ensemble
+from icha.uncertainty.ensembles import ensemble
 
 
 def test_comparison_is_of_the_first_loading():

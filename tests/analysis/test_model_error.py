@@ -1,6 +1,5 @@
 """The error is nothing for a state compared with itself, and the exact number for one changed by a known amount."""
 
-import compared_campaign as compared
 import numpy as np
 import pytest
 import small_campaign as small
@@ -18,7 +17,6 @@ from compared_campaign import (
 )
 
 import icha
-from icha.analysis.measured_error import _range, measured_errors
 from icha.analysis.model_error import (
     AXES,
     SHARED,
@@ -188,25 +186,3 @@ def test_runs_that_ended_early_do_not_count(tmp_path):
         np.testing.assert_allclose(soft["area_error_mean"].values, known.mean())
         np.testing.assert_allclose(soft["area_error_deviation"].values, abs(known[0] - known[1]) / np.sqrt(2))
         assert np.isnan(bare["area_error"]).all() and np.isnan(bare["area_error_mean"]).all()
-
-
-def test_the_error_of_each_study_is_stated_with_its_range_and_its_size():
-    truths = compared.patches(area=1.25, separation=0.8)
-    errors = model_error(compared.tree_of_both(), truths)
-    (statement,) = measured_errors(errors).values()
-    assert statement.about == "error" and statement.text == (
-        "of the asperity model in study one: contact area 20 to 20 % too small, mean separation 25 to 25 % too large "
-        "(3 seeds, 2 loads, boundary elements)"
-    )
-
-
-@pytest.mark.parametrize(
-    ("values", "words"),
-    [
-        ([-0.18, -0.11, np.nan], "11 to 18 % too small"),
-        ([0.02, 0.05], "2 to 5 % too large"),
-        ([-0.03, 0.05], "from 3 % too small to 5 % too large"),
-    ],
-)
-def test_ranges_have_one_sign_convention(values, words):
-    assert _range(np.array(values)) == words

@@ -21,8 +21,6 @@ from outside_validators import sealed
 from sampled_cases import sampled
 
 import icha
-from icha.analysis.estimates import estimate_campaign
-from icha.analysis.sensitivity import sensitivity_of_campaign
 from icha.configuration.campaign import Campaign
 from icha.configuration.cases import run_cases
 from icha.configuration.load import load_configuration
@@ -31,6 +29,8 @@ from icha.datasets.files import read_campaign, write_dataset
 from icha.datasets.results import FIGURE_ENDINGS
 from icha.datasets.table import as_csv, tidy_table
 from icha.figures.registry import draw_figure
+from icha.uncertainty.estimates import estimate_campaign
+from icha.uncertainty.sensitivity import sensitivity_of_campaign
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"

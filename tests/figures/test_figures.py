@@ -33,8 +33,8 @@ from icha.figures.style import (
 )
 from icha.references.persson import persson_pressure_density
 from icha.references.theories import reference_dataset
-from icha.support.statistics import ensemble
 from icha.surfaces.moments import spectral_moments
+from icha.uncertainty.ensembles import ensemble
 
 LABELS = RunLabels("one", "asperities", "rough", 1, 1.0, "soft")
 KIND = "reduced_pressure"

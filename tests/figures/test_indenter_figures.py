@@ -8,7 +8,6 @@ import pytest
 from typer.testing import CliRunner
 
 import icha
-from icha.analysis.validity import statements_on_dataset
 from icha.asperity.tabor import SHORT_RANGE_FROM
 from icha.cli import app
 from icha.datasets.campaign_file import campaign_tree
@@ -19,6 +18,7 @@ from icha.figures import against_load, against_parameter, at_one_load, contact_m
 from icha.figures.captions import units_of_shapes
 from icha.figures.drawn import caption_of, table_of
 from icha.figures.indenter_curves import select_series
+from icha.report.validity import statements_on_dataset
 from icha.surfaces.shapes import Cone, CylinderPunch, Sphere
 
 SIDE, GRID, MODULUS, RADIUS = 48e-6, 48, 1e6, 1e-3

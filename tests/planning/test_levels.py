@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from icha.analysis.control_variates import quantile
 from icha.configuration.load import load_configuration
 from icha.configuration.studies import PILOT, Study
 from icha.planning.levels import choose_for_study, words_of_levels, write_levels
+from icha.uncertainty.control_variates import quantile
 
 COSTS = {"asperities": 1.0, "coarse": 4.0, "fine": 20.0}
 
@@ -131,5 +131,5 @@ def test_written_levels_replace_the_pilot_and_are_in_the_configuration_as_used(l
 
 def test_levels_in_words():
     assert words_of_levels({"coarse": 9, "fine": 1}) == (
-        "9 seeds of coarse boundary elements, 1 seed of fine boundary elements"
+        "9 seeds of boundary elements on half the grid, 1 seed of boundary elements"
     )

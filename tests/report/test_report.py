@@ -10,7 +10,6 @@ import pytest
 import small_campaign as small
 
 from icha.analysis.checks import check_campaign
-from icha.analysis.measured_error import measured_errors
 from icha.checks.findings import Check
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import read_dataset
@@ -21,6 +20,7 @@ from icha.figures.style import save
 from icha.report import report
 from icha.report.report import write_report
 from icha.report.spectra import draw_spectra, read_surface_statistics
+from icha.report.validity import measured_errors
 from icha.support.formatting import format_quantity
 
 

@@ -6,15 +6,15 @@ from job import job_context
 
 from icha.analysis.checks import check_campaign, worst, write_checks
 from icha.analysis.common_loads import compare_campaign
-from icha.analysis.estimates import estimate_campaign
 from icha.analysis.model_error import model_error
-from icha.analysis.sensitivity import sensitivity_of_campaign
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import read_run, write_dataset
 from icha.datasets.labels import RunLabels
 from icha.datasets.stamp import refuse_outdated
 from icha.datasets.table import as_csv, tidy_table
 from icha.support.atomic_files import whole_file
+from icha.uncertainty.estimates import estimate_campaign
+from icha.uncertainty.sensitivity import sensitivity_of_campaign
 
 
 def analyse(runs, outputs, *, stamps, compared, varied, samples, attributes, described):

@@ -3,8 +3,16 @@
 from icha.datasets.variables.terms import read_tables
 
 _NO_ESTIMATE = "where too few seeds have results"
-_WITHOUT = ("estimate", "share_seeds", "share_model", "share_refinement", "asperity_coefficient", "degrees_of_freedom")
-_MISSING = {name: {"missing": _NO_ESTIMATE} for name in _WITHOUT} | {
+# Variables without a value if no mean is estimated, besides the interval and the error of the grid.
+WITHOUT_ESTIMATE = (
+    "estimate",
+    "share_seeds",
+    "share_model",
+    "share_refinement",
+    "asperity_coefficient",
+    "degrees_of_freedom",
+)
+_MISSING = {name: {"missing": _NO_ESTIMATE} for name in WITHOUT_ESTIMATE} | {
     "estimate_low": {"missing": "where more than a tenth of the runs is left out"},
     "estimate_high": {"missing": "where more than a tenth of the runs is left out"},
     "share_grid": {"missing": "where the study has no runs on half the grid"},

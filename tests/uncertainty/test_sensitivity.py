@@ -9,14 +9,14 @@ from sampled_cases import COUNT, sampled
 from scipy import stats
 from scipy.stats import qmc, sobol_indices
 
-from icha.analysis.estimates import estimate_campaign
-from icha.analysis.polynomial_chaos import expand
-from icha.analysis.sensitivity import sensitivity_of_campaign
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import inputs_study
 from icha.figures import samples
 from icha.report.answers import distribution_words, samples_table
-from icha.support.distributions import Distribution
+from icha.uncertainty.distributions import Distribution
+from icha.uncertainty.estimates import estimate_campaign
+from icha.uncertainty.polynomial_chaos import expand
+from icha.uncertainty.sensitivity import sensitivity_of_campaign
 
 
 @pytest.fixture(scope="module")

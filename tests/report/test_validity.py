@@ -3,17 +3,16 @@
 import math
 import re
 
+import compared_campaign as compared
+import numpy as np
 import pytest
 import small_campaign as small
 from conftest import REPOSITORY
 
-from icha.analysis.validity import (
-    VALIDATION,
-    Case,
-    statements,
-    statements_on_dataset,
-)
+from icha.analysis.model_error import model_error
 from icha.datasets.campaign_file import campaign_tree
+from icha.planning.statements import VALIDATION, Case, statements
+from icha.report.validity import _range, measured_errors, statements_on_dataset
 from icha.surfaces.resolution import Resolution
 
 
@@ -110,3 +109,25 @@ def test_the_data_say_to_which_runs_their_model_is_not_applicable():
     ]
     assert not found.good and found.text.startswith(f"a model is not applicable to {len(marked)} runs: ")
     assert all(f"{material} surface" in found.text for material in marked)
+
+
+def test_the_error_of_each_study_is_stated_with_its_range_and_its_size():
+    truths = compared.patches(area=1.25, separation=0.8)
+    errors = model_error(compared.tree_of_both(), truths)
+    (statement,) = measured_errors(errors).values()
+    assert statement.about == "error" and statement.text == (
+        "of the asperity model in study one: contact area 20 to 20 % too small, mean separation 25 to 25 % too large "
+        "(3 seeds, 2 loads, boundary elements)"
+    )
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ([-0.18, -0.11, np.nan], "11 to 18 % too small"),
+        ([0.02, 0.05], "2 to 5 % too large"),
+        ([-0.03, 0.05], "from 3 % too small to 5 % too large"),
+    ],
+)
+def test_ranges_have_one_sign_convention(values, words):
+    assert _range(np.array(values)) == words

@@ -174,27 +174,6 @@ def error_of_area(patches: float, cells: float) -> tuple[float, str]:
     return error, f"areas of {size} have an error of about {_two_digits(100 * error)} % and are more often too small"
 
 
-def describe_lightest_state(campaign: xr.DataTree, studies: Iterable[str]) -> str:
-    """Return a sentence on the error of the area with the fewest cells, at targets of boundary elements; "" without.
-
-    Only targets of the first loading count.
-    """
-    from icha.datasets.campaign import loading_stops
-
-    found = math.inf, ""
-    for study in (campaign[name].to_dataset() for name in studies if name in campaign.children):
-        if REFERENCE_MODEL not in study["model"].values:
-            continue
-        runs = study.sel(model=REFERENCE_MODEL)
-        cells = (runs["contact_area_fraction"] * nodes_of(runs)).where(loading_stops(runs) & (runs["spot_count"] > 0))
-        if cells.notnull().any() and (least := float(cells.min())) < found[0]:
-            at = cells.argmin(cells.dims)
-            names = " on ".join(str(runs[label].isel({label: at[label]}).item()) for label in ("material", "surface"))
-            patches = float(runs["spot_count"].transpose(*cells.dims).isel(at))
-            found = least, f"{error_of_area(patches, least)[1]} ({names}, at the smallest load)"
-    return found[1]
-
-
 def error_beyond(known: float, quantity: str, length: float, patches: float, cells: float) -> str:
     """Return words on the error of the grid if the interval of an estimate does not contain this error, else "".
 

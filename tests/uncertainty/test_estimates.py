@@ -12,13 +12,13 @@ import small_campaign as small
 import xarray as xr
 from typer.testing import CliRunner
 
-from icha.analysis import control_variates
-from icha.analysis.estimates import estimate_campaign
 from icha.cli import app
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import write_dataset
 from icha.datasets.labels import RunLabels, coarse_study
 from icha.report.answers import answers_of, answers_table, sentences
+from icha.uncertainty import control_variates
+from icha.uncertainty.estimates import estimate_campaign
 
 COARSE, FINE = 1.3, 1.25
 

@@ -1,7 +1,7 @@
 """Estimate the results of every study that has boundary elements for several seeds, with intervals.
 
 The asperity model for many seeds, boundary elements on half the grid for some seeds, and boundary elements on the grid
-for a few seeds are combined (`icha.analysis.control_variates`). The coarse runs of a study are in the study that
+for a few seeds are combined (`icha.uncertainty.control_variates`). The coarse runs of a study are in the study that
 `coarse_study` names. If parameters are sampled, the scatter of the results over the sampled cases widens the interval.
 """
 
@@ -13,9 +13,18 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from icha.analysis.control_variates import PROBABILITY, estimate_quantity
-from icha.analysis.grid_error import cells_of_length, error_beyond, nodes_of
-from icha.analysis.left_out import (
+from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
+from icha.datasets.attributes import DERIVED, combine_attributes
+from icha.datasets.build import build_dataset, stack_rows
+from icha.datasets.campaign import loading_stops
+from icha.datasets.labels import LABELS, coarse_study, inputs_study, is_derived_study, slopes_at
+from icha.datasets.variables.answers import ANSWERS, WITHOUT_ESTIMATE
+from icha.datasets.variables.run import OF_LOSS
+from icha.path.targets import ESTIMATED_AT_TARGETS, ESTIMATED_OF_LOOPS, OF_ADHESION, OF_SQUARES, SIGNED
+from icha.support.formatting import format_count
+from icha.uncertainty.control_variates import LEVELS, PROBABILITY, estimate_quantity
+from icha.uncertainty.grid_error import cells_of_length, error_beyond, nodes_of
+from icha.uncertainty.left_out import (
     ENDED_EARLY,
     NO_FIT,
     NOT_POSITIVE,
@@ -24,14 +33,6 @@ from icha.analysis.left_out import (
     find_left_out,
     varied_parameters,
 )
-from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
-from icha.datasets.attributes import DERIVED, combine_attributes
-from icha.datasets.build import build_dataset, stack_rows
-from icha.datasets.campaign import loading_stops
-from icha.datasets.labels import LABELS, coarse_study, inputs_study, is_derived_study, slopes_at
-from icha.datasets.variables.answers import ANSWERS
-from icha.datasets.variables.run import OF_LOSS
-from icha.path.targets import ESTIMATED_AT_TARGETS, ESTIMATED_OF_LOOPS, OF_ADHESION, OF_SQUARES, SIGNED
 
 LOOP = "loop"
 
@@ -77,20 +78,22 @@ def _answers(
     levels = {"asperities": (study if asperities else None, DEFAULT_MODEL), "coarse": (coarse, REFERENCE_MODEL)}
     levels |= {"fine": (study, REFERENCE_MODEL)}
     runs = study.sel(model=REFERENCE_MODEL)
-    of_runs = cells_of_length(runs), nodes_of(runs)
-    of_runs += (runs["surface_energy"],)
     lengths, nodes, energies = (
-        each.broadcast_like(runs["status"]).min("seed").transpose(*CONTACT).values for each in of_runs
+        each.broadcast_like(runs["status"]).min("seed").transpose(*CONTACT).values
+        for each in (cells_of_length(runs), nodes_of(runs), runs["surface_energy"])
     )
+    of_loop = np.full([study.sizes[dim] for dim in DIMS], np.nan)
     every = (*ESTIMATED_AT_TARGETS, *ESTIMATED_OF_LOOPS)
     for (kind, target), quantity in itertools.product([*stops_of(study), (LOOP, 0.0)], every):
         prescribed = kind in ESTIMATED_AT_TARGETS.get(quantity, ())
         if (kind == LOOP) != (quantity in ESTIMATED_OF_LOOPS) or prescribed or quantity not in study:
             continue
         values = {level: values_of(data, model, quantity, kind, target) for level, (data, model) in levels.items()}
+        areas, patches = (
+            of_loop if kind == LOOP else values_of(study, REFERENCE_MODEL, name, kind, target).values
+            for name in ("contact_area_fraction", "spot_count")
+        )
         known = study[quantity].notnull().any([dim for dim in study[quantity].dims if dim != "surface"]).values
-        areas = values_of(study, REFERENCE_MODEL, "contact_area_fraction", kind, target) if kind != LOOP else None
-        patches = values_of(study, REFERENCE_MODEL, "spot_count", kind, target) if kind != LOOP else None
         for place in itertools.product(*(range(study.sizes[dim]) for dim in CONTACT)):
             if quantity in OF_SQUARES and not known[place[0]]:
                 continue  # a periodic surface
@@ -105,8 +108,9 @@ def _answers(
             share_inputs, *of_cases = _scatter_of_inputs(inputs, quantity, kind, target)
             left_out += of_cases
             surface, slope, material = place
-            area, count = (_mean_at(each, place) for each in (areas, patches))
+            at = (slice(None), *place)
             known_error = mean.relative.grid if mean else math.nan
+            size = lengths[place], _mean(patches[at]), _mean(areas[at]) * nodes[place]
             yield {
                 "quantity": quantity,
                 "units": study[quantity].attrs["units"],
@@ -115,23 +119,27 @@ def _answers(
                 "material": str(study["material"].values[material]),
                 "stop_kind": kind,
                 "stop_target": target,
-                "grid_error": error_beyond(known_error, quantity, lengths[place], count, area * nodes[place]),
+                "grid_error": error_beyond(known_error, quantity, *size),
                 "share_inputs": share_inputs,
                 **_estimate(quantity, mean, share_inputs, all(each.has_interval for each in left_out)),
                 "asperity_seeds": len(by_seed["asperities"]),
                 "coarse_seeds": len(by_seed["coarse"]),
                 "fine_seeds": len(by_seed["fine"]),
-                "full_contact_seeds": sum(area == 1 for area in _levels_at({"fine": areas}, place)[0]["fine"].values()),
+                "full_contact_seeds": int((areas[at] == 1).sum()),
                 "left_out": ". ".join(filter(None, (note, *(each.sentence for each in left_out)))),
                 "biased": int(any(each.biased for each in left_out)),
             }
 
 
+def _mean(values):
+    """Return the mean of the values that are not NaN; NaN without such values."""
+    return float(np.nanmean(values)) if np.isfinite(values).any() else math.nan
+
+
 def _estimate(quantity, mean, share_inputs, has_interval):
     """Return the values of an estimate and its interval; NaN without an estimate or an interval."""
     if mean is None:
-        nothing = ("estimate", "estimate_low", "estimate_high", "share_seeds", "share_model", "share_refinement")
-        nothing += ("share_grid", "asperity_coefficient", "degrees_of_freedom")
+        nothing = (*WITHOUT_ESTIMATE, "estimate_low", "estimate_high", "share_grid")
         return dict.fromkeys(nothing, math.nan) | {"geometric": 0}
     found = mean.relative
     half_width = math.hypot(found.half_width, 0.0 if math.isnan(share_inputs) else share_inputs)
@@ -154,13 +162,6 @@ def _estimate(quantity, mean, share_inputs, has_interval):
     }
 
 
-_SEEDS_OF = {
-    "asperities": "seeds of the asperity model",
-    "coarse": "seeds of boundary elements on half the grid",
-    "fine": "seeds of boundary elements",
-}
-
-
 def _levels_at(values, place):
     """Return the values of a contact by level and seed, the seeds that each level leaves out, and a note.
 
@@ -168,33 +169,24 @@ def _levels_at(values, place):
     The asperity model is not used if it has no value for a seed of boundary elements that has one.
     """
     at = (slice(None), *place)
-    found = {
-        level: {seed: (value, cause) for seed, value, cause in zip(of.seeds, of.values[at], of.causes[at], strict=True)}
-        for level, of in values.items()
-        if of is not None
-    }
+    present = {level: of for level, of in values.items() if of is not None}
+    causes = {level: dict(zip(of.seeds, of.causes[at], strict=True)) for level, of in present.items()}
     by_seed, left_out, lacking, note = {level: {} for level in values}, [], {}, ""
-    of_cells = ("coarse", "fine")
-    complete = {seed for level in of_cells for seed, (_, cause) in found.get(level, {}).items() if not cause}
-    of_asperities = {seed: cause for seed, (_, cause) in found.get("asperities", {}).items()}
+    complete = {seed for level in ("coarse", "fine") for seed, why in causes.get(level, {}).items() if not why}
+    of_asperities = causes.get("asperities", {})
     lost = [of_asperities[seed] for seed in complete if of_asperities.get(seed, "") not in ("", *WITHOUT_RUN)]
     if lost:
-        seeds = f"{len(lost)} seed{'s' * (len(lost) > 1)} of boundary elements"
+        seeds = f"{format_count(len(lost), 'seed')} of boundary elements"
         note = f"the asperity model is not used, because it has no value for {seeds} ({lost[0]})"
-        del found["asperities"]
-    for level, of_level in found.items():
-        causes = {seed: cause or lacking.get(seed, "") for seed, (_, cause) in of_level.items()}
-        by_seed[level] = {seed: float(value) for seed, (value, _) in of_level.items() if not causes[seed]}
+        del causes["asperities"]
+    for level, of_level in causes.items():
+        why = {seed: cause or lacking.get(seed, "") for seed, cause in of_level.items()}
+        of_seeds = zip(of_level, present[level].values[at], strict=True)
+        by_seed[level] = {seed: float(value) for seed, value in of_seeds if not why[seed]}
         if by_seed[level] or level == "fine":
-            lacking = causes
-            left_out.append(find_left_out(_SEEDS_OF[level], list(causes.values())))
+            lacking = why
+            left_out.append(find_left_out(f"seeds of {LEVELS[level]}", list(why.values())))
     return by_seed, left_out, note
-
-
-def _mean_at(of_level, place):
-    """Return the mean over the seeds of a level for a contact; NaN without values."""
-    values = _levels_at({"fine": of_level}, place)[0]["fine"].values()
-    return sum(values) / len(values) if values else math.nan
 
 
 def _scatter_of_inputs(inputs, quantity, kind, target):
@@ -233,7 +225,7 @@ class Values(NamedTuple):
     Attributes
     ----------
     values : values along seed, surface, slope and material; NaN where a run has none.
-    causes : why a run has no value (`icha.analysis.left_out`), along the same dimensions; empty where it has one.
+    causes : why a run has no value (`icha.uncertainty.left_out`), along the same dimensions; empty where it has one.
     seeds : the seeds.
     """
 

@@ -8,17 +8,6 @@ import xarray as xr
 from sampled_cases import COUNT, sampled
 
 from icha.analysis.checks import check_campaign
-from icha.analysis.estimates import estimate_campaign
-from icha.analysis.left_out import (
-    ENDED_EARLY,
-    FAILED,
-    NOT_COMPUTED,
-    NOT_REQUESTED,
-    find_left_out,
-    left_out_of_study,
-    too_few,
-)
-from icha.analysis.sensitivity import left_out_of_samples, sensitivity_of_campaign
 from icha.checks.run import attributes_of_failure, check_run
 from icha.datasets.campaign import select_run
 from icha.datasets.campaign_file import campaign_tree
@@ -28,6 +17,17 @@ from icha.figures import against_parameter, samples
 from icha.figures.captions import count_runs
 from icha.figures.looks import FEWER_SEEDS
 from icha.report.answers import answers_of, samples_table
+from icha.uncertainty.estimates import estimate_campaign
+from icha.uncertainty.left_out import (
+    ENDED_EARLY,
+    FAILED,
+    NOT_COMPUTED,
+    NOT_REQUESTED,
+    find_left_out,
+    left_out_of_study,
+    too_few,
+)
+from icha.uncertainty.sensitivity import left_out_of_samples, sensitivity_of_campaign
 
 ENERGY = 1e-3 * np.array([1, 2, 3, 4, 5, 6, 7, 8, 8.5, 9.3, 10, 11, 12, 13, 14, 15])
 WORDS = "9 of 16 cases; 7 failed a check, all with surface energy above 9.2 mJ/m²"

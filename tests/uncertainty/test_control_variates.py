@@ -7,8 +7,8 @@ import pytest
 import xarray as xr
 from scipy.stats import t
 
-from icha.analysis.allocation import allocate, variances_per_seed
-from icha.analysis.control_variates import ORDER, PROBABILITY, estimate_mean, estimate_quantity, quantile
+from icha.uncertainty.allocation import allocate, variances_per_seed
+from icha.uncertainty.control_variates import ORDER, PROBABILITY, estimate_mean, estimate_quantity, quantile
 
 
 def by_seed(values):

@@ -1,4 +1,4 @@
-"""State the validity of the models for a campaign: the verified range of each model, and the size of its errors.
+"""Statements on the validity of the models: the verified range of each model, and the size of its errors.
 
 Checks verify that equations were solved. Statements of validity describe how accurate the models are. ICHA prints these
 short statements before and after a campaign runs, and at the top of the report of the campaign.
@@ -7,26 +7,17 @@ short statements before and after a campaign runs, and at the top of the report 
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-import numpy as np
-
-from icha.analysis.grid_error import cells_of_loops, describe_lightest_state, describe_loops, is_resolved
 from icha.asperity.full_contact import HIGH_PULL_OFF_BELOW, MEANING, expected_behaviour
 from icha.asperity.material import WU_HOLDS_FROM
 from icha.asperity.tabor import SHORT_RANGE_FROM, describe_short_range
-from icha.contact.models import DEFAULT_MODEL, MODELS
-from icha.datasets.attributes import reasons_not_applicable
-from icha.datasets.labels import LABELS, is_derived_study
-from icha.datasets.variables.campaign import COMPUTED_RUNS
+from icha.contact.models import MODELS
 from icha.path.targets import MAX_AREA_FRACTION, largest_area_fraction
-from icha.support.formatting import format_count, format_quantity, join_first
-from icha.surfaces.resolution import LEAST_CELLS, RADIUS, RECOMMENDED_CELLS, Resolution
-
-if TYPE_CHECKING:
-    import xarray as xr
+from icha.support.formatting import format_quantity, join_first
+from icha.surfaces.resolution import LEAST_CELLS, RECOMMENDED_CELLS, Resolution
+from icha.uncertainty.grid_error import describe_loops, is_resolved
 
 # Relative errors of the asperity model in per cent, with adhesion (True) and without (False): lowest and highest mean
 # over the seeds. Campaign `validation` computes these errors. A test compares them with the page docs/validation.md.
@@ -42,16 +33,12 @@ _ATOM = 1e-10
 # Keys of `Case.facts` that may be missing. The first four are in Pa: pressure for complete contact, strength of the
 # interface, strength without flaws, and largest tension that the grid resolves. The other three are in m: size of the
 # grid cells, rms height, and largest rms height of a sticky surface in the bearing area model.
-COMPLETE, STRENGTH, THEORETICAL = "complete_contact_pressure", "interface_strength", "theoretical_strength"
+COMPLETE_PRESSURE, STRENGTH, THEORETICAL = "complete_contact_pressure", "interface_strength", "theoretical_strength"
 RESOLVED, SPACING = "resolved_tension", "spacing"
 TABOR = "tabor_parameter"
 RMS_HEIGHT, STICKY_HEIGHT = "rms_height", "sticky_rms_height"
 # 1 for a surface with a shape, otherwise 0. Ratio of the works of adhesion of receding and advancing edges.
 SHAPED, DIRECTION = "shaped", "direction"
-_OF_FULL_CONTACT = (COMPLETE, STRENGTH, THEORETICAL, RESOLVED)
-
-# ICHA warns if more than this fraction of the single-asperity spots is outside the range of Wu's formula.
-_FEW = 0.05
 
 
 class Range(NamedTuple):
@@ -151,7 +138,7 @@ def statements(
     outside : text with the surfaces and materials whose jumps into contact are outside the verified range; "" if there
         are none; None without adhesion.
     sticky : surfaces and materials whose attraction outweighs repulsion, from `describe_sticky`.
-    loops : cells in the length of loops by boundary elements (`icha.analysis.grid_error.cells_of_loops`).
+    loops : cells in the length of loops by boundary elements (`icha.uncertainty.grid_error.cells_of_loops`).
     """
     cases = list(cases)
     found = [Statement("models", _used(models)), *_full_contact(cases)]
@@ -182,8 +169,12 @@ def _full_contact(cases):
         f"{expected_behaviour(lowest.ratio, receding)}; U_full/dgamma is about {lowest.ratio:.3g} or more "
         f"({lowest.material} on {lowest.surface}); {MEANING}"
     )
-    if COMPLETE in lowest.facts:
-        pressures = lowest.facts[COMPLETE], lowest.facts[COMPLETE] - lowest.facts[STRENGTH], lowest.facts[STRENGTH]
+    if COMPLETE_PRESSURE in lowest.facts:
+        pressures = (
+            lowest.facts[COMPLETE_PRESSURE],
+            lowest.facts[COMPLETE_PRESSURE] - lowest.facts[STRENGTH],
+            lowest.facts[STRENGTH],
+        )
         complete, opening, strength = (format_quantity(float(f"{pressure:.2g}"), "Pa") for pressure in pressures)
         if lowest.facts[STRENGTH] < lowest.facts[THEORETICAL]:
             strength += f" with its flaw, {format_quantity(lowest.facts[THEORETICAL], 'Pa')} without the flaw"
@@ -278,30 +269,6 @@ def _accuracy(cases, measured):
     return Statement("accuracy", f"{known}; {text}" if known else text, False)
 
 
-def statements_on_dataset(campaign: xr.DataTree) -> list[Statement]:
-    """Return statements on the validity of the models for a campaign dataset, including runs that ended early.
-
-    If the dataset is open and not loaded, only a few variables are read from the file.
-    """
-    models, cases, shares, sticky = {}, [], {}, {}
-    for name, node in campaign.children.items():
-        if is_derived_study(name, campaign.children):
-            continue  # runs for an answer, of which no user asked
-        study = node.to_dataset()
-        models[name] = [str(model) for model in study["model"].values]
-        cases += _cases(study)
-        if DEFAULT_MODEL in models[name]:
-            for (surface, material), share in _shares_outside(study).items():
-                shares[surface, material] = max(share, shares.get((surface, material), 0.0))
-                found = study["stickiness"].sel(surface=surface, material=material)
-                sticky[surface, material] = max(float(found.max()), sticky.get((surface, material), 0.0))
-    outside = _describe_shares(shares) if shares else None
-    found = statements(models, cases, outside, describe_sticky(sticky), cells_of_loops(campaign, models))
-    if lightest := describe_lightest_state(campaign, models):
-        found.append(Statement("grid", lightest))
-    return [*found, *describe_layers(_radii_on_layers(campaign)), *_not_applicable(campaign)]
-
-
 def describe_layers(shares: Mapping[str, float]) -> Iterator[Statement]:
     """Yield a statement if shapes are pressed on layers, where the laws of a half-space do not hold.
 
@@ -316,73 +283,6 @@ def describe_layers(shares: Mapping[str, float]) -> Iterator[Statement]:
         yield Statement("layer", text, False)
 
 
-def _radii_on_layers(campaign):
-    """Return the largest contact radius of shapes on layers, over the thickness, by names of material and surface."""
-    shares = {}
-    for node in campaign.children.values():
-        if "layer_thickness" in node and "shape" in node:
-            study = node.to_dataset()[["contact_radius", "layer_thickness"]].load()
-            share = study["contact_radius"] / study["layer_thickness"]
-            share = share.max([name for name in share.dims if name not in ("surface", "material")])
-            share = share.where(share > 0).transpose("surface", "material")
-            for (surface, material), value in share.to_series().dropna().items():
-                name = f"{material} on {surface}"
-                shares[name] = max(value, shares.get(name, 0.0))
-    return shares
-
-
-def _not_applicable(campaign):
-    """Yield the statement on the runs for which the asperity model is not applicable."""
-    reasons = sum(map(reasons_not_applicable, campaign.children.values()), Counter())
-    if reasons:
-        text = f"a model is not applicable to {format_count(reasons.total(), 'run')}: {join_first(reasons, '. ')}"
-        yield Statement("applicability", text, False)
-
-
-def _cases(study):
-    """Yield a `Case` for every computed run of a study."""
-    measured = [name for name in (*VALIDATED, *_OF_FULL_CONTACT, TABOR) if name in study]
-    status = study["status"].transpose(*LABELS)
-    counts = ("period", "grid", "asperity_count", "unsupported_summit_count", "boundary", "surface_energy")
-    counts += ("short_wavelength", "short_wavelength_estimated", "rms_slope")
-    values = {
-        name: study[name].broadcast_like(status).transpose(*LABELS).values
-        for name in (*measured, *counts, *(["shape"] if "shape" in study else []))
-    }
-    unsupported, radii = values["unsupported_summit_count"], _smallest_radii(study)
-    # Surfaces may have slopes of their own, so that the coordinate of slopes has two dimensions.
-    names = {LABELS.index(label): study[label].values for label in ("model", "surface", "material")}
-    for at in map(tuple, np.argwhere(np.isin(status.values, COMPUTED_RUNS))):
-        model, surface, material = (str(known[at[column]]) for column, known in names.items())
-        facts = {name: float(values[name][at]) for name in measured}
-        facts[SPACING] = values["period"][at] / values["grid"][at]
-        summits = values["asperity_count"][at] + unsupported[at]
-        if not values["surface_energy"][at]:
-            facts.pop(TABOR, None)
-        resolution = Resolution(
-            float(values["short_wavelength"][at] / facts[SPACING]),
-            estimated=bool(values["short_wavelength_estimated"][at]),
-        )
-        facts["nodes_per_short_wave"] = resolution.cells
-        if radii is not None and not values["rms_slope"][at]:
-            resolution = min(resolution, Resolution(float(radii[at] / facts[SPACING]), RADIUS))
-        facts["unsupported_summits"] = float(unsupported[at] / max(summits, 1))
-        facts[SHAPED] = float("shape" in values and bool(values["shape"][at]))
-        facts["free_edges"] = float(values["boundary"][at] != "periodic")
-        yield Case(model, surface, material, facts, resolution)
-
-
-def _smallest_radii(study):
-    """Return the smallest contact radius of each run at a target of the first loading, m; None without a shape."""
-    if "shape" not in study:
-        return None
-    from icha.datasets.campaign import loading_stops  # imports xarray, which takes time
-
-    area = study["contact_area_fraction"].where(loading_stops(study) & (study["contact_area_fraction"] > 0))
-    radius = study["period"] * np.sqrt(area.min("step") / np.pi)
-    return radius.fillna(np.inf).transpose(*LABELS).values
-
-
 def describe_sticky(stickiness: Mapping[tuple[str, str], float]) -> list[str]:
     """Describe each pair of surface and material with a stickiness (`icha.asperity.stickiness`) larger than 1."""
     return [
@@ -390,30 +290,6 @@ def describe_sticky(stickiness: Mapping[tuple[str, str], float]) -> list[str]:
         for (surface, material), value in stickiness.items()
         if value > 1
     ]
-
-
-def _describe_shares(shares):
-    """Describe surfaces and materials with many single-asperity spots outside Wu's range, largest fraction first."""
-    cases = [
-        f"{material} on {surface} ({100 * share:.0f} % of single spots)"
-        for (surface, material), share in sorted(shares.items(), key=lambda item: -item[1])
-        if share > _FEW
-    ]
-    return f"outside this range: {join_first(cases)}" if cases else ""
-
-
-def _shares_outside(study):
-    """Return the fraction of single-asperity spots outside the range of Wu's formula, by surface and material.
-
-    The fraction is the largest value of all seeds and slopes, at the end of the first loading.
-    Materials without adhesion are left out, because their spots do not jump into contact.
-    """
-    runs = study[["status", "leg", "outside_wu_fraction", "surface_energy"]].sel(model=DEFAULT_MODEL).load()
-    end = (runs["leg"] == 0).sum("step") - 1
-    counted = runs["status"].isin(COMPUTED_RUNS) & (end >= 0) & (runs["surface_energy"] > 0)
-    shares = runs["outside_wu_fraction"].isel(step=end.clip(min=0)).where(counted).max(("seed", "rms_slope"))
-    shares = shares.transpose("surface", "material").to_series().dropna()
-    return {tuple(map(str, case)): share for case, share in shares.items()}
 
 
 def _used(models):

@@ -19,7 +19,7 @@ A3163-A3194. The variance with a fitted coefficient is that of double sampling (
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +27,13 @@ from scipy.stats import t as students_t
 
 # Probability that an interval contains the mean over infinitely many seeds on the fine grid.
 PROBABILITY = 0.9
+# The levels from cheap to accurate, in words, and the variables with their numbers of seeds.
+LEVELS = {
+    "asperities": "the asperity model",
+    "coarse": "boundary elements on half the grid",
+    "fine": "boundary elements",
+}
+SEEDS = {"asperities": "asperity_seeds", "coarse": "coarse_seeds", "fine": "fine_seeds"}
 # Smallest number of coarse seeds for a fitted coefficient. With fewer seeds, the coefficient is 1.
 ENOUGH_TO_FIT = 5
 # Logarithms are averaged if their standard deviation over the seeds is at most this value. Then their mean differs from
@@ -168,6 +175,17 @@ def estimate_mean(
         coefficient,
         freedom,
     )
+
+
+def share_of_levels(present: Sequence[str]) -> dict[str, str]:
+    """Return which share of the half-width falls as each of the `present` levels has more seeds.
+
+    The scatter of the seeds is that of the cheapest level. The next level corrects the model, unless both levels are
+    boundary elements; the fine level corrects the coarse grid.
+    """
+    finest = "refinement" if "coarse" in present else "model"
+    shares = {"coarse": "model", "fine": finest} | {present[0]: "seeds"}
+    return {level: shares[level] for level in present}
 
 
 def quantile(freedom):

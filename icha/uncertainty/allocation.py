@@ -11,10 +11,8 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from icha.analysis.control_variates import quantile
+from icha.uncertainty.control_variates import SEEDS, quantile, share_of_levels
 
-# Variables with the number of seeds, by level. Seeds of a level are among those of the level before.
-LEVELS = {"asperities": "asperity_seeds", "coarse": "coarse_seeds", "fine": "fine_seeds"}
 # Fewest seeds of each level: the scatter of a level must be known, and the coefficient of the asperities fitted.
 _LEAST = {"asperities": 5, "coarse": 5, "fine": 2}
 # Largest number of iterations for numbers of seeds and quantiles that depend on each other.
@@ -26,16 +24,10 @@ def variances_per_seed(answers: xr.Dataset) -> tuple[dict[str, np.ndarray], np.n
 
     Variances are those of means of logarithms. A level without seeds is left out.
     """
-    counts = {level: answers[name].values for level, name in LEVELS.items()}
-    present = [level for level, count in counts.items() if count.any()]
-    # The share of the scatter is that of the cheapest level. The next level corrects the model, unless both levels are
-    # boundary elements; the fine level corrects the coarse grid.
-    of_level = {"coarse": "model", "fine": "refinement" if "coarse" in present else "model"} | {present[0]: "seeds"}
-    deviations = {
-        level: answers[f"share_{of_level[level]}"].values / quantile(answers["degrees_of_freedom"].values)
-        for level in present
-    }
-    per_seed = {level: deviation**2 * counts[level] for level, deviation in deviations.items()}
+    counts = {level: answers[name].values for level, name in SEEDS.items()}
+    shares = share_of_levels([level for level, count in counts.items() if count.any()])
+    width = quantile(answers["degrees_of_freedom"].values)
+    per_seed = {level: (answers[f"share_{name}"].values / width) ** 2 * counts[level] for level, name in shares.items()}
     return per_seed, np.nan_to_num(answers["share_grid"].values) ** 2
 
 

@@ -9,14 +9,6 @@ import small_campaign as small
 from drawn import legend
 
 import icha
-from icha.analysis.estimates import estimate_campaign
-from icha.analysis.grid_error import (
-    AREA_ERROR,
-    LOOP_ERRORS,
-    cells_of_length,
-    error_beyond,
-)
-from icha.analysis.validity import statements_on_dataset
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import RunLabels
 from icha.figures import against_parameter
@@ -24,6 +16,14 @@ from icha.figures import loops as loop_figures
 from icha.figures.drawn import caption_of
 from icha.figures.looks import COARSE_GRID
 from icha.report.answers import answers_of, answers_table
+from icha.report.validity import statements_on_dataset
+from icha.uncertainty.estimates import estimate_campaign
+from icha.uncertainty.grid_error import (
+    AREA_ERROR,
+    LOOP_ERRORS,
+    cells_of_length,
+    error_beyond,
+)
 from validation import loop_grid
 
 LABELS = RunLabels("pull", "boundary_elements", "rough", 1, 1.0, "soft")

@@ -1,0 +1,1 @@
+"""Uncertainty of results: means over seeds, estimates with intervals, errors of grids, sampled parameters."""
