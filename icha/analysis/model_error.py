@@ -3,12 +3,11 @@
 The reference of a run is the run of the same study with boundary elements.
 """
 
-import contextlib
 import itertools
 from collections.abc import Iterable, Mapping
-from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 from scipy.stats import wasserstein_distance
 
@@ -17,8 +16,8 @@ from icha.contact.model import GAP_BINS, PRESSURE_BINS
 from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
 from icha.datasets.attributes import DERIVED, combine_attributes, why_no_result
 from icha.datasets.build import bin_values, describe_variables, make_variable
-from icha.datasets.campaign import find_snapshot, loading_stops, select_run, spots_of
-from icha.datasets.labels import LABELS, RunLabels, arrange_slopes, labels_at, place_of, slope_dims
+from icha.datasets.campaign import find_snapshot, loading_stops, run_place, select_run, spots_of
+from icha.datasets.labels import LABELS, RunLabels
 from icha.datasets.variables.campaign import COMPLETE, INCOMPLETE, NOT_IN_DESIGN, RAGGED, STATUS
 from icha.datasets.variables.model_error import ASKED, BINS, MODEL_ERROR
 from icha.datasets.variables.terms import MATERIAL, Variable
@@ -32,16 +31,6 @@ _SUMMARY = "Results of the model and of boundary elements for the same topograph
 # Labels of the runs except the model.
 _LABELS = tuple(label for label in LABELS if label != "model")
 AXES = (*_LABELS, "reduced_pressure")
-
-
-class ComparedState(NamedTuple):
-    """Labels of a state that is compared: a run without its study and model, and the target of the load."""
-
-    surface: str
-    seed: int
-    rms_slope: float
-    material: str
-    reduced_pressure: float
 
 
 # Variables that must be equal in a run and its reference, up to the relative difference `_ROUNDING`.
@@ -96,50 +85,43 @@ def model_error(
         names the run.
     """
     origins: dict[str, list[dict[str, str]]] = {}
-    studies: dict[str, dict[ComparedState, dict | None]] = {}
+    studies: dict[str, list[dict]] = {}
     for labels, truth in runs:
         labels = RunLabels(*labels)
-        run = select_run(campaign, labels._replace(model=DEFAULT_MODEL))
+        compared = labels._replace(model=DEFAULT_MODEL)
+        run, place = select_run(campaign, compared), run_place(campaign[labels.study].dataset, compared)
         try:
-            studies.setdefault(labels.study, {}).update(_compare_stops(labels, run, truth))
+            rows = [place | row for row in _compare_stops(run, truth)]
         except ValueError as error:
             raise ValueError(f"{labels}: {error}") from None
+        studies.setdefault(labels.study, []).extend(rows)
         origins.setdefault(labels.study, []).extend((run.attrs, truth.attrs))
     groups = {}
-    for name, states in studies.items():
-        if not states:
-            continue
-        # If a run has no state at a load of other runs of the study, its state at this load is None.
-        loads = {state.reduced_pressure for state in states}
-        for state in [state._replace(reduced_pressure=load) for state in states for load in loads]:
-            states.setdefault(state, None)
-        attributes = combine_attributes(f"{_TITLE}, study {name}", _SUMMARY, DERIVED, origins[name])
-        groups[f"/{name}"] = _study_dataset(campaign[name].to_dataset(), states).assign_attrs(
-            attributes | {"study": name}
-        )
+    for name, rows in studies.items():
+        if rows:
+            attributes = combine_attributes(f"{_TITLE}, study {name}", _SUMMARY, DERIVED, origins[name])
+            found = _study_dataset(campaign[name].to_dataset(), rows)
+            groups[f"/{name}"] = found.assign_attrs(attributes | {"study": name})
     root = combine_attributes(_TITLE, _SUMMARY, DERIVED, itertools.chain(*origins.values()))
     return xr.DataTree.from_dict({"/": xr.Dataset(attrs=root | dict(attrs))} | groups)
 
 
-def _compare_stops(labels, run, truth):
-    """Compare an asperity run with boundary elements at each load; None if a state is missing or if contact is full."""
+def _compare_stops(run, truth):
+    """Yield a row for each load; it has no values of a state that is missing or in full contact."""
     if difference := difference_of_contacts(run, truth):
         raise ValueError(difference)
     failed = why_no_result(run.attrs) or why_no_result(truth.attrs)
-    found = {}
     stops, true_stops = _stops(run), _stops(truth)
     for load in dict.fromkeys((*stops, *true_stops)):
-        state = None
+        row = {"reduced_pressure": load}
         in_both = not failed and load in stops and load in true_stops
         # In full contact the mean separation is zero, and without contact the area: relative errors are undefined.
-        positive = in_both and all(truth[name].values[true_stops[load]] > 0 for name in _POSITIVE)
-        if positive:
-            state = _amounts(run.isel(step=stops[load]), truth.isel(step=true_stops[load]), load)
+        if in_both and all(truth[name].values[true_stops[load]] > 0 for name in _POSITIVE):
+            row |= _amounts(run.isel(step=stops[load]), truth.isel(step=true_stops[load]), load)
             snapshots = [snapshot_if_any(each, REDUCED_PRESSURE, load) for each in (run, truth)]
             if None not in snapshots:
-                state |= _shapes(run, truth, *snapshots)
-        found[ComparedState(*labels[2:], load)] = state
-    return found
+                row |= _shapes(run, truth, *snapshots)
+        yield row
 
 
 def _stops(run):
@@ -261,77 +243,41 @@ def _values_and_weights(quantity, state):
     return np.concatenate([[0.0], values]), np.concatenate([[rest], content])
 
 
-def _study_dataset(study, states):
-    """Arrange the compared states of a study as a dataset along `AXES`; a missing state is None."""
-    axes = _axes(study, states)
-    slopes = axes["rms_slope"]
-    coords = {
-        label: (
-            slope_dims(slopes) if label == "rms_slope" else label,
-            np.array(axes[label], dtype=study[label].dtype),
-            study[label].attrs,
-        )
-        for label in _LABELS
-    }
-    coords["reduced_pressure"] = make_variable(ASKED, axes["reduced_pressure"])
-    labelled = xr.Dataset(coords=coords)
-    shape = tuple(labelled.sizes[axis] for axis in AXES)
-    grid = [ComparedState(*labels_at(labelled, place, AXES)) for place in np.ndindex(shape)]
-    # The comparison of a run is complete if states were compared at one load or more.
-    statuses = [
-        NOT_IN_DESIGN if labels not in states else INCOMPLETE if states[labels] is None else COMPLETE for labels in grid
-    ]
-    variables = {"status": make_variable(STATUS._replace(dims=_LABELS), np.reshape(statuses, shape).min(axis=-1))}
-    variables |= _arrange(shape, [states.get(labels) for labels in grid])
-    applicability = _of_model(DEFAULT_MODEL, study["applicability"], labelled)
-    variables |= _summarise_over_seeds(variables, applicability.values[..., None] == "")
-    bins = describe_variables(BINS, bin_values("gap", GAP_BINS) | bin_values("pressure", PRESSURE_BINS))
-    coords |= {name: bins.pop(name) for name in BINS if BINS[name].coordinate}
-    result = xr.Dataset(variables | bins, coords)
-    for quantity in MATERIAL:
-        result[quantity] = study[quantity].sel(material=axes["material"])
-    result["tabor_parameter"] = _of_model(DEFAULT_MODEL, study["tabor_parameter"], labelled)
-    result["attraction"] = _of_model(REFERENCE_MODEL, study["attraction"], labelled)
-    return result.assign(applicability=applicability)
+def _study_dataset(study, rows):
+    """Arrange the compared states of a study as a dataset along `AXES`.
 
-
-def _of_model(model, quantity, labelled):
-    """Return a quantity of the runs of a model along the labels of `labelled`; NaN or "" for missing runs."""
-    none = "" if quantity.dtype.kind in "OSU" else np.nan
-    values = np.full([labelled.sizes[label] for label in _LABELS], none, object if none == "" else float)
-    for place in np.ndindex(values.shape):
-        labels = dict(zip(_LABELS, labels_at(labelled, place, _LABELS), strict=True))
-        with contextlib.suppress(KeyError):
-            values[place] = quantity.isel(place_of(quantity.to_dataset(), {"model": model} | labels)).item()
-    return xr.Variable(_LABELS, values, quantity.attrs)
-
-
-def _axes(study, states):
-    """Return the values along each of `AXES` in compared states; `arrange_slopes` gives the rms slopes."""
-    asked = {axis: {getattr(labels, axis) for labels in states} for axis in AXES}
-    axes = {
-        label: [value for value in study[label].values.tolist() if value in asked[label]]
-        for label in ("surface", "seed", "material")
-    }
-    order = axes["surface"].index
-    pairs = sorted({(labels.surface, labels.rms_slope) for labels in states}, key=lambda pair: order(pair[0]))
-    axes |= {"rms_slope": arrange_slopes(pairs), "reduced_pressure": sorted(asked["reduced_pressure"])}
-    return {axis: axes[axis] for axis in AXES}
-
-
-def _arrange(shape, states):
-    """Return the variables of all states as arrays along `AXES` with the given shape; NaN where a state is None."""
+    Each row has the indices of its run along the labels of the study, the load, and the values of its state, if any.
+    """
     bins = {"gap_bin": len(GAP_BINS) - 1, "pressure_bin": len(PRESSURE_BINS) - 1}
-    variables = {}
-    for name, description in MODEL_ERROR.items():
-        unknown = np.full([bins[dim] for dim in description.dims], np.nan)
-        values = np.array([unknown if state is None else state.get(name, unknown) for state in states])
-        values = values.reshape(shape + values.shape[1:])
-        missing = {"missing": "where a run has no state at the load"} if None in states else {}
-        variables[name] = xr.Variable(AXES + description.dims, values, description.attributes | missing)
-        if description.dtype is int and values.dtype.kind == "f":
+    # The comparison of a run is complete if states were compared at one load or more.
+    columns = {"status": ("state", [COMPLETE if "area_error" in row else INCOMPLETE for row in rows])}
+    for name, described in MODEL_ERROR.items():
+        unknown = np.full([bins[dim] for dim in described.dims], np.nan)
+        columns[name] = ("state", *described.dims), np.array([row.get(name, unknown) for row in rows])
+    index = pd.MultiIndex.from_frame(pd.DataFrame(rows)[list(AXES)])
+    states = xr.Dataset(columns, xr.Coordinates.from_pandas_multiindex(index, "state"))
+    states = states.unstack("state", fill_value={"status": NOT_IN_DESIGN}).transpose(*AXES, ...)
+    runs = study.isel({label: states[label].values for label in _LABELS})
+    applicability, tabor = (_of_model(runs, DEFAULT_MODEL, name) for name in ("applicability", "tabor_parameter"))
+    variables = {"status": make_variable(STATUS._replace(dims=_LABELS), states["status"].min("reduced_pressure"))}
+    missing = {"missing": "where a run has no state at the load"} if states["area_error"].isnull().any() else {}
+    for name, described in MODEL_ERROR.items():
+        variables[name] = xr.Variable((*AXES, *described.dims), states[name].values, described.attributes | missing)
+        if described.dtype is int and missing:
             variables[name].encoding["dtype"] = np.dtype("int32")
-    return variables
+    variables |= _summarise_over_seeds(variables, applicability.values[..., None] == "")
+    variables |= describe_variables(BINS, bin_values("gap", GAP_BINS) | bin_values("pressure", PRESSURE_BINS))
+    coords = {label: runs[label] for label in _LABELS}
+    coords |= {"reduced_pressure": make_variable(ASKED, states["reduced_pressure"])}
+    coords |= {name: variables.pop(name) for name in BINS if BINS[name].coordinate}
+    of_runs = {name: runs[name] for name in MATERIAL} | {"tabor_parameter": tabor}
+    of_runs |= {"attraction": _of_model(runs, REFERENCE_MODEL, "attraction"), "applicability": applicability}
+    return xr.Dataset(variables | {name: each.variable for name, each in of_runs.items()}, coords)
+
+
+def _of_model(runs, model, name):
+    """Return a variable of the runs of a model along all labels."""
+    return runs[name].broadcast_like(runs["status"]).sel(model=model).transpose(*_LABELS)
 
 
 def _summarise_over_seeds(variables, applicable):
