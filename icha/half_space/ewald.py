@@ -1,11 +1,9 @@
 """Ewald sums for the displacement of a half-space by forces at points and by their periodic images.
 
 A point force F displaces the half-space by F/(pi E* r). The sum includes all periodic images, and a uniform
-counter-pressure that keeps the mean displacement zero. Ewald's method splits 1/r into two halves. The smooth half,
-erf(alpha r)/r, is summed as a Fourier series with non-uniform FFTs. Each Fourier mode of the smooth half is
-(2/(E* q)) erfc(q/(2 alpha)), divided by the area of the periodic cell. The short-ranged half, erfc(alpha r)/r, is
-summed over pairs of close points. A point may also have moments of a pressure. The displacement by the k-th moment is
-proportional to the k-th power of the plane Laplacian, applied to 1/r (`icha.half_space.grid_displacement`).
+counter-pressure that keeps the mean displacement zero. The smooth half of the sum (`icha.half_space.split`) is a
+Fourier series, computed with non-uniform FFTs. The short-ranged half is summed over pairs of close points. A point may
+also have moments of a pressure (`icha.half_space.grid_displacement`).
 
 A single square on a free half-space has no images. The square is placed in a periodic cell of twice its side. In
 this cell, two points of the square are closer to each other than to any image. `icha.half_space.free_square` subtracts
@@ -21,9 +19,10 @@ import finufft
 import numpy as np
 import scipy.sparse
 from scipy.spatial import cKDTree
-from scipy.special import erf, erfc
+from scipy.special import erfc
 
 from icha.half_space.free_square import basis, image_field
+from icha.half_space.split import MOMENTS, short_mean, smooth_half, smooth_mode
 from icha.surfaces.square import cell_of, periodic_difference
 
 # The short-ranged half ends at this value of alpha r, the smooth half at this value of q/(2 alpha); erfc(4.3) = 1.2e-9.
@@ -38,32 +37,6 @@ NEIGHBOURS_ONCE = 20
 # Within this distance, in mean spacings of the points, the fields of the moments are constant, because the true fields
 # are singular at r = 0. Exact displacements replace the constant values.
 _FLOOR = 0.05
-
-
-def _smooth_kernel(r, alpha):
-    """Return two arrays: erf(alpha r)/r and its plane Laplacian at distances r >= 0."""
-    x = alpha * r
-    tiny = x < 0.05
-    safe = np.where(tiny, 1.0, r)
-    value = erf(alpha * safe) / safe
-    gauss = 2 * alpha / np.sqrt(np.pi) * np.exp(-((alpha * safe) ** 2))
-    laplacian = value / safe**2 - gauss * (1 / safe**2 + 2 * alpha**2)
-    x2 = np.where(tiny, x, 0.0) ** 2
-    scale = 2 * alpha / np.sqrt(np.pi)
-    value = np.where(tiny, scale * (1 - x2 / 3 + x2**2 / 10 - x2**3 / 42), value)
-    # Laplacian of r^(2k) in the plane is 4 k^2 r^(2k-2).
-    laplacian = np.where(tiny, scale * alpha**2 * (-4 / 3 + 16 / 10 * x2 - 36 / 42 * x2**2), laplacian)
-    return value, laplacian
-
-
-def smooth_mode(q, alpha, contact_modulus, period):
-    """Return the Fourier mode of the displacement by a unit force at wave number q > 0: smooth half only, m/N."""
-    return 2 / (contact_modulus * q * period**2) * erfc(q / (2 * alpha))
-
-
-def short_mean(alpha, contact_modulus, period):
-    """Return the mean over the cell of the displacement by a unit force: short-ranged half only, m/N."""
-    return 2 / (np.sqrt(np.pi) * contact_modulus * alpha * period**2)
 
 
 class _SmoothSum:
@@ -191,9 +164,8 @@ class Ewald:
     @cached_property
     def self_displacement(self):
         """Smooth half of the displacement of a point by its unit force, m/N, and by its unit second moment, 1/(N m)."""
-        value, laplacian = _smooth_kernel(np.zeros(1), self.alpha)
-        scale = 1 / (np.pi * self.contact_modulus)
-        return scale * value[0], scale * laplacian[0]
+        scale, value = 1 / (np.pi * self.contact_modulus), 2 * self.alpha / np.sqrt(np.pi)
+        return scale * value, scale * (value * self.alpha**2 * (-4 / 3))
 
     def kernels(self, r):
         """Return three arrays: short-ranged displacement at distances r by unit moments k = 0, 1, 2.
@@ -218,9 +190,9 @@ class Ewald:
         low = np.flatnonzero(r < self.floor)
         if len(low):
             # Below the floor only the short-ranged half is constant.
-            smooth, smooth_at_floor = _smooth_kernel(r[low], self.alpha), _smooth_kernel(raised[low], self.alpha)
-            force[low] += smooth[0] - smooth_at_floor[0]
-            moment[low] += smooth[1] - smooth_at_floor[1]
+            at, at_floor = (smooth_half((self.alpha * x[low]) ** 2, np.eye(2, MOMENTS)) for x in (r, raised))
+            force[low] += self.alpha * (at - at_floor)[0]
+            moment[low] += self.alpha**3 * (at - at_floor)[1]
         scale = 1 / (np.pi * self.contact_modulus)
         return scale * force, scale * moment, scale * fourth
 

@@ -9,11 +9,13 @@ plain sum of 1/r.
 from functools import lru_cache
 
 import numpy as np
-from scipy.special import erf, erfc
+from scipy.special import erfc
+
+from icha.half_space.split import MOMENTS, short_mean, smooth_half, smooth_mode
 
 # Number of Chebyshev nodes along a side; the relative error of the displacement by images is 2e-14.
 _NODES = 18
-# Ewald sum in `image_potential`: parameter alpha, in 1/cell; cut-off of the short-ranged half, in cells; and highest
+# Ewald sum in `_image_potential`: parameter alpha, in 1/cell; cut-off of the short-ranged half, in cells; and highest
 # mode of the smooth half. The omitted terms are below 2e-17.
 _ALPHA = 3.0
 _REACH = 3
@@ -73,30 +75,29 @@ def _chebyshev():
 
 @lru_cache(maxsize=1)
 def _image_potential_matrix():
-    """Return the matrix of `image_potential` at node i by a unit source at node j: shape (nodes^2, nodes^2)."""
+    """Return the potential at node i by the images of a unit source at node j: shape (nodes^2, nodes^2)."""
     nodes, _, _ = _chebyshev()
     distance, index = np.unique(np.round(np.abs(nodes[:, None] - nodes), 15), return_inverse=True)
-    index = index.reshape(_NODES, _NODES)
-    potential = image_potential(distance[:, None], distance)
+    potential = _image_potential(distance)
     return potential[index[:, None, :, None], index[None, :, None, :]].reshape(_NODES**2, _NODES**2)
 
 
-def image_potential(y, x):
-    """Return the sum of 1/r over all images of a point, in cells of side 1, minus a uniform background."""
-    r = np.hypot(y, x)
-    safe = np.where(r > 0, r, 1.0)
-    potential = -np.where(r > 0, erf(_ALPHA * safe) / safe, 2 * _ALPHA / np.sqrt(np.pi))
-    for m in range(-_REACH, _REACH + 1):
-        for n in range(-_REACH, _REACH + 1):
-            if m or n:
-                r = np.hypot(y - m, x - n)
-                potential += erfc(_ALPHA * r) / r
-    for m in range(-_HIGHEST, _HIGHEST + 1):
-        for n in range(-_HIGHEST, _HIGHEST + 1):
-            if m or n:
-                k = np.hypot(m, n)
-                potential += erfc(np.pi * k / _ALPHA) / k * np.cos(2 * np.pi * m * y) * np.cos(2 * np.pi * n * x)
-    return potential - 2 * np.sqrt(np.pi) / _ALPHA
+def _image_potential(distance):
+    """Return the sum of 1/r over all images of a point, minus a uniform background, in a cell of side 1.
+
+    distance : (k,) float, distances from the point along y, and along x; the result is a (k, k) array.
+    """
+    near, modes = np.arange(-_REACH, _REACH + 1), np.arange(-_HIGHEST, _HIGHEST + 1)
+    to_images = distance[:, None] - near
+    r = np.hypot(to_images[:, None, :, None], to_images[None, :, None, :])
+    q = 2 * np.pi * np.hypot(modes[:, None], modes)
+    # The point itself and the mean do not count.
+    r[:, :, _REACH, _REACH] = q[_HIGHEST, _HIGHEST] = np.inf
+    waves = np.cos(2 * np.pi * distance[:, None] * modes)
+    x2 = _ALPHA**2 * np.add.outer(distance**2, distance**2)
+    own = _ALPHA * smooth_half(x2.ravel(), np.eye(1, MOMENTS)).reshape(x2.shape)
+    potential = waves @ smooth_mode(q, _ALPHA, 1 / np.pi, 1) @ waves.T - short_mean(_ALPHA, 1 / np.pi, 1)
+    return potential + np.sum(erfc(_ALPHA * r) / r, axis=(2, 3)) - own
 
 
 def mean_displacement(side: float, contact_modulus: float, position, force) -> float:

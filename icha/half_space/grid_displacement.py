@@ -18,11 +18,10 @@ from functools import cached_property
 import finufft
 import numpy as np
 import scipy.fft
-from scipy.special import erf
 
 from icha.asperity.jkr import JKR
-from icha.half_space.ewald import short_mean, smooth_mode
 from icha.half_space.free_square import basis, image_field
+from icha.half_space.split import MOMENTS, short_mean, smooth_half, smooth_mode
 from icha.support.parallel import blocks, on_cores
 from icha.surfaces.square import cell_of
 
@@ -32,15 +31,11 @@ _NUFFT_TOLERANCE = 1e-12
 # Farther from a spot than this distance, in contact radii, four moments represent the spot. The error is then 1e-8 of
 # the displacement at the edge of the spot.
 _WINDOW = 5.0
-_MOMENTS = 4
 # Ratio of the window widths of two successive groups of spots.
 _LADDER = math.sqrt(2)
 # Number of nodes in a block of rows. Number of nodes in windows that are evaluated together. Both fit into the cache.
 _BLOCK = 2**19
 _BATCH = 2**15
-# If (alpha r)^2 is below the first value, a power series of `_SERIES_LENGTH` terms gives the smooth half.
-_SERIES_BELOW = 0.25
-_SERIES_LENGTH = 15
 
 
 def row_blocks(grid: int) -> list[slice]:
@@ -120,7 +115,7 @@ class DisplacementField:
         field = 0.0
         for group in self._groups:
             bases = (basis(self.centres[group.spots, axis], self._cell) for axis in (1, 0))
-            moments = group.moments.T / group.alpha ** (2 * np.arange(_MOMENTS)[:, None])
+            moments = group.moments.T / group.alpha ** (2 * np.arange(MOMENTS)[:, None])
             field = field + image_field(*bases, moments, self._cell, self.law.material.contact_modulus)
         return nodes, nodes, field
 
@@ -140,9 +135,9 @@ class DisplacementField:
     def _make_group(self, spots, reach):
         """Make the group of the spots with these indices, with windows of half width `reach`, m."""
         a, R, alpha = self.contact_radius[spots], self.radius_of_curvature[spots], _CUT / reach
-        order = np.arange(_MOMENTS)
+        order = np.arange(MOMENTS)
         factorial = np.cumprod(np.maximum(order, 1))
-        moments = self.law.select(spots).moments(a, R, _MOMENTS)
+        moments = self.law.select(spots).moments(a, R, MOMENTS)
         moments *= (0.25 * (alpha * a[:, None]) ** 2) ** order / factorial**2
         return _Group(spots, reach, alpha, moments)
 
@@ -213,73 +208,6 @@ class _Group:
     reach: float
     alpha: float
     moments: np.ndarray
-
-
-def smooth_half(y, moments):
-    """Return the sum over k of moments[:, k] Lap^k (erf(x)/x) at y = x^2, where Lap is the plane Laplacian.
-
-    y : (m, n) float, values of (alpha r)^2; moments : (m, 4) float, as in `_Group`.
-    """
-    coefficients = np.einsum("mk,kj->mj", moments, _SMOOTH_HALF)
-    multipole, gauss, series = np.split(coefficients, [_MOMENTS, 3 * _MOMENTS - 2], axis=1)
-    safe = np.maximum(y, _SERIES_BELOW)
-    inverse = 1 / safe
-    value = _horner(multipole[:, :, None], inverse)
-    value *= erf(np.sqrt(safe))
-    value *= np.sqrt(inverse)
-    # The polynomial of the Gaussian has powers from -3 to 2.
-    factor = _horner(gauss[:, _MOMENTS - 1 :, None], safe)
-    factor += _horner(gauss[:, _MOMENTS - 2 :: -1, None], inverse) * inverse
-    factor *= np.exp(-safe)
-    value -= factor
-    near = np.flatnonzero(y < _SERIES_BELOW)
-    if len(near):
-        value.ravel()[near] = _horner(series[near // y.shape[1]], y.ravel()[near])
-    return value
-
-
-def _horner(coefficients, x):
-    """Return the values of polynomials at x; `coefficients` has the lowest power first along axis 1."""
-    value = coefficients[:, -1] * x
-    for k in range(coefficients.shape[1] - 2, 0, -1):
-        value += coefficients[:, k]
-        value *= x
-    value += coefficients[:, 0]
-    return value
-
-
-def _smooth_half_table():
-    """Return the coefficients of Lap^k (erf(x)/x), k = 0..3 (rows), in powers of y = x^2.
-
-    The columns are the coefficients of (1) the factor of erf(x)/x, y^0 to y^-3, (2) the factor of exp(-y), y^-3 to y^2,
-    and (3) the power series of the whole function, from y^0.
-
-    Lap^k (erf(x)/x) = (d_k y^-k) erf(x)/x - exp(-y) g_k(y) with Laurent polynomials g_k. In the plane, Lap y^j is
-    4 j^2 y^(j-1), so that d_(k+1) = (2k+1)^2 d_k. The derivative of erf, 2/sqrt(pi) exp(-y), gives the rule for g_k.
-    """
-    multipole = np.zeros((_MOMENTS, _MOMENTS))
-    gauss = np.zeros((_MOMENTS, 2 * _MOMENTS - 2))
-    zero = _MOMENTS - 1
-    multipole[0, 0] = 1.0
-    for k in range(_MOMENTS - 1):
-        d, g = multipole[k, k], gauss[k]
-        multipole[k + 1, k + 1] = (2 * k + 1) ** 2 * d
-        new = gauss[k + 1]
-        new[zero - k] += 2 * d * 2 / math.sqrt(math.pi)
-        new[zero - k - 1] += (4 * k + 1) * d * 2 / math.sqrt(math.pi)
-        for j in range(-k, k):
-            new[zero + j - 1] += 4 * j**2 * g[zero + j]
-            new[zero + j] -= 4 * (2 * j + 1) * g[zero + j]
-            new[zero + j + 1] += 4 * g[zero + j]
-    length = _SERIES_LENGTH + _MOMENTS
-    power = np.arange(length)
-    series = [2 / math.sqrt(math.pi) * (-1.0) ** power / ([math.factorial(j) for j in power] * (2 * power + 1))]
-    for _ in range(_MOMENTS - 1):
-        series.append(np.append((4 * power**2 * series[-1])[1:], 0.0))
-    return np.hstack([multipole, gauss, np.array(series)[:, :_SERIES_LENGTH]])
-
-
-_SMOOTH_HALF = _smooth_half_table()
 
 
 def windows(centres, reach: float, grid: int, period: float, rows: slice):

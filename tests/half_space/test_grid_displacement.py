@@ -6,7 +6,8 @@ import scipy.special
 from fields import displacement_field
 from half_space import CENTRES, CURVATURE, ENERGIES, MODULUS, RADIUS, law, periodic_displacement, spectral_displacement
 
-from icha.half_space.grid_displacement import smooth_half, windows
+from icha.half_space.grid_displacement import windows
+from icha.half_space.split import smooth_half
 
 
 @pytest.mark.parametrize("k", range(4))
