@@ -16,7 +16,7 @@ from icha.asperity.material import Material
 from icha.boundary_elements import minimise as solver
 from icha.boundary_elements.elastic import HalfSpace
 from icha.boundary_elements.full_contact import ROUNDING, FullContactProblem
-from icha.boundary_elements.laws import AtDistance, Cohesive, NoAttraction, ShortRange, at_cells, average
+from icha.boundary_elements.laws import TOUCHING, AtDistance, Cohesive, NoAttraction, ShortRange, at_cells, average
 from icha.boundary_elements.observables import PatchObservables
 from icha.boundary_elements.patches import (
     BEYOND_EDGES,
@@ -27,6 +27,7 @@ from icha.boundary_elements.patches import (
     patch_events,
     unpack,
 )
+from icha.boundary_elements.window import Window
 from icha.contact.attraction import FINITE_RANGE, SHORT_RANGE, attraction_on
 from icha.contact.checkpoints import CheckpointedContact
 from icha.contact.model import AREA_FRACTION, PRESSURE, Control, NotConverged
@@ -104,12 +105,10 @@ class BoundaryElements(FullContactProblem):
 
     def untouched(self) -> CellState:
         """Return the state without contact where a first summit jumps into contact, or a point touches or attracts."""
-        separation = float(self.heights.max())
         if isinstance(self.attraction, ShortRange):
-            first = self.asperities.height + self.attraction.jump_in * self.spacing
-            separation = float(np.max(first, initial=separation))
+            separation = float(np.max(self.heights + self.attraction.jump_in * self.spacing))
         else:
-            separation += self.attraction.reach * self.spacing * _BEYOND_REACH
+            separation = float(self.heights.max()) + self.attraction.reach * self.spacing * _BEYOND_REACH
         nothing = np.zeros(0)
         return CellState(separation, nothing.astype(int), nothing, nothing, nothing)
 
@@ -327,80 +326,105 @@ class BoundaryElements(FullContactProblem):
         """Return False: every equilibrium is a minimum of energy."""
         return False
 
-    def _start(self, state, separation):
-        """Return positions and fractions, (n, n), predicted at a separation (m) by the rates of a state.
+    def _start(self, window, state, separation):
+        """Return positions and fractions on a window, predicted at a separation (m) by the rates of a state.
 
         If a long step would open bonds, cells in contact keep their positions.
         """
-        pressure, distance = state.pressure / self.contact_modulus, (separation - state.separation) / self.spacing
-        fraction = self.field(state.cells, state.fraction if self.adhesive else 0.0)
-        before = self.space.displacement(self.field(state.cells, pressure))
-        change = np.zeros_like(before)
-        if state.rates is not None:
-            change = self.space.displacement(self.field(state.cells, state.rates * distance))
-            if np.abs(change).max() > _LARGEST_PREDICTION:
-                change[:] = 0.0
-        if not self.space.free:
-            before -= before.mean()
-            change -= change.mean()
+        space, distance = self.space.part(window.grid), (separation - state.separation) / self.spacing
+
+        def displacement(values):
+            displaced = space.displacement(window.of(self.field(state.cells, values)))
+            return displaced if space.free else displaced - displaced.mean()
+
+        position = displacement(state.pressure / self.contact_modulus) + state.separation / self.spacing
+        change = np.zeros_like(position) if state.rates is None else displacement(state.rates * distance)
+        if np.abs(change).max() > _LARGEST_PREDICTION:
+            change[:] = 0.0
         change += distance
-        if self.adhesive and change.ravel()[state.cells].max(initial=0.0) > _KEPT_BONDS * self.attraction.reach:
-            change.ravel()[state.cells] = 0.0
-        return before + state.separation / self.spacing + change, fraction
+        fraction = window.of(self.field(state.cells, state.fraction if self.adhesive else 0.0))
+        touching = np.pad(fraction > 0, (0, len(position) - len(fraction)))
+        if np.max(change, where=touching, initial=0.0) > _KEPT_BONDS * self.attraction.reach:
+            change[touching] = 0.0
+        return position + change, fraction
+
+    def _window(self, state, separation, window=None):
+        """Return a window with all cells that touch or attract if a state moves to a separation (m).
+
+        It contains all cells of a given window. A periodic surface has only one window.
+        """
+        whole = Window.whole(self.space.grid)
+        if not self.space.free:
+            return whole
+        position, fraction = self._start(whole, state, separation)
+        cells = self.crop(self.attraction.acts_on(position - self.cell_heights, fraction))
+        if window is None:
+            return Window.around(cells)
+        outside = cells.copy()
+        outside[window.inside] = False
+        if not outside.any():
+            return window
+        outside[window.inside] = True
+        return Window.around(outside)
 
     def _solve(self, state, separation, pressure=None):
         """Solve the equilibrium at a separation (m), or at a nominal pressure (Pa) with a guess of the separation."""
-        unit = self.contact_modulus
-        if pressure is not None:
-            control = solver.Control(load=pressure / unit * self.count / self.heights.size)
-            separation = separation if separation > self.smallest_gap else 0.5 * state.separation
-        else:
-            control = solver.Control(**{"rigid" if self.space.free else "mean": separation / self.spacing})
-        position, fraction = self._start(state, separation)
-        law = replace(self.attraction, before=fraction) if self.law.material.directed else self.attraction
-        found = solver.minimise(
-            self.space,
-            law,
-            self.cell_heights,
-            position,
-            fraction,
-            control,
-            _GAP_ERROR * self.rms_height / self.spacing,
-        )
-        return self._state_of(found, law)
+        law = self.attraction
+        if self.law.material.directed:
+            law = replace(law, before=self.field(state.cells, state.fraction))
+        if pressure is not None and separation <= self.smallest_gap:
+            separation = 0.5 * state.separation
+        window, wider = None, self._window(state, separation)
+        while window is None or wider.side > window.side:
+            window = wider
+            problem = solver.Problem(self.space, law, self.cell_heights).part(window)
+            position, fraction = self._start(window, state, separation)
+            if pressure is not None:
+                control = solver.Control(load=pressure / self.contact_modulus * self.count / position.size)
+            else:
+                control = solver.Control(**{"rigid" if self.space.free else "mean": separation / self.spacing})
+            tolerance = _GAP_ERROR * self.rms_height / self.spacing
+            found = solver.minimise(problem, position, fraction, control, tolerance)
+            state = self._state_of(found, window)
+            separation, wider = state.separation, self._window(state, state.separation, window)
+        return self._with_rates(state, found, problem)
 
-    def _state_of(self, found, law):
-        """Return the state of a contact solved with a law of attraction, with its rates and slopes."""
+    def _state_of(self, found, window):
+        """Return the state of an equilibrium on a window, without rates."""
         if found.held.all():
             return self.full_contact(found.load * self.contact_modulus)
-        touching = found.fraction > 0 if self.adhesive else found.held
-        cells = np.flatnonzero(touching)
-        mean = found.position.mean() - self.space.mean_compliance * found.load
-        fraction = found.fraction.ravel()[cells] if self.adhesive else np.ones(len(cells))
-        neighbours = average(found.fraction).ravel()[cells] if self.divides_cells else np.zeros(len(cells))
-        pressure = found.pressure.ravel()[cells] * self.contact_modulus
-        state = CellState(
+        cells = self._touching(found)
+        mean = found.position.mean() - self.space.part(window.grid).mean_compliance * found.load
+        return CellState(
             mean * self.spacing,
-            cells,
-            fraction,
-            pressure,
-            neighbours,
+            window.cells(cells, self.space.grid),
+            found.fraction.ravel()[cells] if self.adhesive else np.ones(len(cells)),
+            found.pressure.ravel()[cells] * self.contact_modulus,
+            average(found.fraction).ravel()[cells] if self.divides_cells else np.zeros(len(cells)),
             residual=found.residual,
             gap_residual=found.gap_residual * self.spacing,
             pending=found.pending,
         )
-        if not len(cells):
+
+    def _touching(self, found):
+        """Return the cells of an equilibrium that touch or attract, (k,) int."""
+        return np.flatnonzero(found.fraction if self.adhesive else found.held)
+
+    def _with_rates(self, state, found, problem):
+        """Return a state with gaps with its rates and slopes, from the equilibrium of a problem."""
+        if self.is_full(state) or not len(state.cells):
             return state
         accuracy = _RATE_ERROR_OF_SPRINGS if self.law.material.directed else _RATE_ERROR
-        found_rates = solver.rates(self.space, law, self.cell_heights, found, accuracy)
-        rates, fraction_rates = (each.ravel()[cells] for each in found_rates[1:])
+        touching = self._touching(found)
+        rates, fraction_rates = (each.ravel()[touching] for each in solver.rates(problem, found, accuracy))
         scale = self.count * self.spacing
         pressure_slope = float(np.sum(rates)) * self.contact_modulus / scale
         if self.divides_cells:
-            area_slope = float(np.sum(ShortRange.reported_area_gradient(fraction, neighbours) * fraction_rates)) / scale
+            gradient = ShortRange.reported_area_gradient(state.fraction, state.mean_fraction)
+            area_slope = float(np.sum(gradient * fraction_rates)) / scale
         elif self.adhesive:
             # The area changes by whole cells. On average it changes nearly as the energetic area.
-            area_slope = float(np.sum(2 * fraction * fraction_rates)) / scale
+            area_slope = float(np.sum(2 * state.fraction * fraction_rates)) / scale
         else:
             # The area changes by whole cells, but on average it is nearly proportional to the load.
             area_slope = self.area_fraction(state) * pressure_slope / (self.pressure(state) or np.inf)
@@ -465,10 +489,12 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
         else:
             R, above = asperities.radius_of_curvature, asperities.height - heights.ravel()[cell]
             # The jump-in distance depends on the product of the square of the work and the radius.
-            jump_in = law.jump_in_approach(R * at_cells(places, cell) ** 2)
-            radius = law.contact_radius(jump_in, R)
+            approach = law.jump_in_approach(R * at_cells(places, cell) ** 2)
+            jump_in, radius = np.full(heights.shape, TOUCHING), np.zeros(heights.shape)
+            np.maximum.at(jump_in.ravel(), cell, (above - approach) / h)
+            radius.ravel()[cell] = law.contact_radius(approach, R) / h
             strength = material.receding.interface_strength / material.contact_modulus
-            attraction = ShortRange(adhesion_length, strength, cell, above / h, -jump_in / h, radius / h, ratio)
+            attraction = ShortRange(adhesion_length, strength, jump_in, radius, ratio)
         if attraction.reach * h < _SMALLEST_OPENING * largest:
             raise ValueError(
                 f"surface_energy: {material.surface_energy:g} J/m^2 is too small: rounding of heights up to "

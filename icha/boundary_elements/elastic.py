@@ -61,6 +61,10 @@ class HalfSpace:
         """Return the body under a surface with `side` cells along a side."""
         return cls(scipy.fft.next_fast_len(2 * side, real=True) if free else side, layer, free)
 
+    def part(self, grid: int) -> HalfSpace:
+        """Return the body under a part of the surface, with a grid of another number of cells along a side."""
+        return HalfSpace(grid, self.layer, self.free)
+
     @property
     def mean_compliance(self) -> float:
         """Mean displacement divided by the mean pressure of the grid on a free square; 0 on a periodic surface.
@@ -74,7 +78,7 @@ class HalfSpace:
         return multiply_modes(displacement, self._stiffness)
 
     def displacement(self, pressure: np.ndarray) -> np.ndarray:
-        """Return the displacement, (n, n), under a pressure, (n, n).
+        """Return the displacement, (n, n), under a pressure, (m, m), m <= n; the other cells carry no pressure.
 
         On a periodic surface, the mean pressure counts as a wave of the longest length. (Only the preconditioner of the
         solver uses this value.)
@@ -104,14 +108,19 @@ _memory = _Memory()
 
 
 def multiply_modes(field: np.ndarray, factors: np.ndarray) -> np.ndarray:
-    """Return a field, (n, n), after its Fourier modes, (n, n//2 + 1), are multiplied by factors."""
+    """Return a field, (n, n), after its Fourier modes, (n, n//2 + 1), are multiplied by factors.
+
+    A smaller field, (m, m), is zero in the other cells.
+    """
     if _memory.modes.shape != factors.shape:
         _memory.modes = np.empty(factors.shape, complex)
-    modes = _memory.modes
-    np.fft.fft(np.fft.rfft(field, axis=1, out=modes), axis=0, out=modes)
+    modes, rows, grid = _memory.modes, len(field), len(factors)
+    np.fft.rfft(field, grid, axis=1, out=modes[:rows])
+    modes[rows:] = 0
+    np.fft.fft(modes, axis=0, out=modes)
     modes *= factors
     np.fft.ifft(modes, axis=0, out=modes)
-    return np.fft.irfft(modes, len(field), axis=1)
+    return np.fft.irfft(modes, grid, axis=1)
 
 
 def wave_numbers(grid: int) -> np.ndarray:

@@ -38,19 +38,21 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 # Width and radius of the stencil in cells, and weight of the perimeter in the work of adhesion, fitted to JKR patches.
-_WIDTH, _RADIUS = 1.5, 5
+_WIDTH, STENCIL_RADIUS = 1.5, 5
 PERIMETER = 0.7
 # Weights of the perimeter and of the width of the front in the reported area, fitted to patches between Hertz and JKR.
 # Smallest reported area of a cell, divided by its fraction.
 _EDGE, _FRONT_WIDTH, _SMALLEST_SHARE = 0.236, 1.115, 0.02
 # Largest part of the grid that discs of new contact close at once.
 _MOST_CLOSED = 0.5
+# Gap of a node below which it touches: smaller than any gap that is not zero.
+TOUCHING = float(np.finfo(float).smallest_subnormal)
 # Smallest change of a gap, over the range, of which the energy is computed exactly.
 _SMALL_CHANGE = 1e-4
 # Rounds in which fractions of neighbours follow each other: for rates, and for each step. Each leaves about a tenth of
 # the error.
 _ROUNDS, _ROUNDS_OF_STEP = 5, 2
-_profile = np.exp(-0.5 * (np.arange(-_RADIUS, _RADIUS + 1) / _WIDTH) ** 2)
+_profile = np.exp(-0.5 * (np.arange(-STENCIL_RADIUS, STENCIL_RADIUS + 1) / _WIDTH) ** 2)
 STENCIL = _profile / _profile.sum()
 
 
@@ -63,7 +65,7 @@ def average(fractions: np.ndarray) -> np.ndarray:
 def _modes_of_stencil(grid):
     """Return the Fourier modes of the stencil w, (n, n//2 + 1)."""
     along = np.zeros(grid)
-    np.add.at(along, np.arange(-_RADIUS, _RADIUS + 1) % grid, STENCIL)
+    np.add.at(along, np.arange(-STENCIL_RADIUS, STENCIL_RADIUS + 1) % grid, STENCIL)
     modes = np.fft.fft(along).real
     return modes[:, None] * modes[: grid // 2 + 1]
 
@@ -290,6 +292,12 @@ class Tangent:
     softening: np.ndarray
     coupling: csr_array | None = None
 
+    def field(self, values: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+        """Return the field, (n, n), from the values of the cells, (k,); it is zero elsewhere."""
+        field = np.zeros(shape)
+        field.ravel()[self.cells] = values
+        return field
+
     def changes(self, gap_change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the changes of fractions and tensions, (k,) each, for a change of the gaps, (n, n)."""
         tension = -self.softening * gap_change.ravel()[self.cells]
@@ -320,7 +328,7 @@ def weights_between(cells: np.ndarray, grid: int) -> csr_array:
 
     number = np.full(grid**2, -1)
     number[cells] = np.arange(len(cells))
-    offset = np.arange(-_RADIUS, _RADIUS + 1)
+    offset = np.arange(-STENCIL_RADIUS, STENCIL_RADIUS + 1)
     (row, column), weight = np.divmod(cells[:, None], grid), np.outer(STENCIL, STENCIL).ravel()
     rows, columns = (row + offset) % grid, (column + offset) % grid
     neighbour = number[(rows[:, :, None] * grid + columns[:, None, :]).reshape(len(cells), offset.size**2)]
@@ -365,6 +373,10 @@ class AtDistance(Bonds):
     def within_reach(self, gap: np.ndarray, fraction: np.ndarray) -> np.ndarray:
         """Return no cells, (k,) int: contact forms by the attraction at a distance."""
         return np.zeros(0, int)
+
+    def acts_on(self, gap: np.ndarray, fraction: np.ndarray) -> np.ndarray:
+        """Return the cells that touch or attract, (n, n) bool."""
+        return gap <= self.reach
 
     def energetic_areas(self, cells: np.ndarray, fraction: np.ndarray, mean_fraction: np.ndarray) -> np.ndarray:
         """Return the energy of adhesion of some cells, (k,), divided by that of a cell in full contact."""
@@ -456,16 +468,14 @@ class ShortRange:
     ----------
     adhesion_length : dgamma/E* of each cell, (n, n) or a number, in cell sizes; that of an advancing front.
     strength : tension, in E*, at which a closed cell opens although its four neighbours are closed.
-    summits, above, jump_in, radius : (k,), cell of each summit, its height above the node of the cell, the largest gap
-        at which it jumps into contact, and the contact radius of a lone summit after its jump, in cell sizes. At most a
-        quarter of the side closes at once. A disc much smaller than this radius could open again.
+    jump_in, radius : (n, n), gap of a node below which the summit of its cell jumps into contact, and contact radius of
+        this summit after its jump, in cell sizes; without a summit TOUCHING and 0. At most a quarter of the side closes
+        at once. A disc much smaller than this radius could open again.
     ratio, before : as in `Cohesive`.
     """
 
     adhesion_length: np.ndarray | float
     strength: float
-    summits: np.ndarray
-    above: np.ndarray
     jump_in: np.ndarray
     radius: np.ndarray
     ratio: float = 1.0
@@ -537,29 +547,29 @@ class ShortRange:
 
     def within_reach(self, gap: np.ndarray, fraction: np.ndarray) -> np.ndarray:
         """Return the open cells that touch, or whose summit is within its reach, (k,) int, ascending."""
-        open_cells = fraction.ravel() == 0
-        near = gap.ravel()[self.summits] - self.above < self.jump_in
-        touching = np.flatnonzero((gap.ravel() <= 0) & open_cells)
-        return np.union1d(self.summits[near & open_cells[self.summits]], touching)
+        return np.flatnonzero((gap < self.jump_in) & (fraction == 0))
 
-    def closing(self, cells: np.ndarray, grid: int) -> np.ndarray:
-        """Return the cells that close, (m,) int, if some cells, (k,) int, come into contact: discs around summits.
+    def acts_on(self, gap: np.ndarray, fraction: np.ndarray) -> np.ndarray:
+        """Return the cells that attract, and those that close if contact forms, (n, n) bool."""
+        return with_neighbours(fraction > 0) | self.closing(self.within_reach(gap, fraction))
+
+    def closing(self, cells: np.ndarray) -> np.ndarray:
+        """Return the cells that close, (n, n) bool, if some cells, (k,) int, come into contact: discs around summits.
 
         Smaller discs close if they cover more than half of the grid: a given mean separation needs room for the gap.
         """
-        chosen, largest = np.isin(self.summits, cells), 0.25 * grid
-        closed = self._discs(self.summits[chosen], np.minimum(self.radius[chosen], largest), grid)
+        radii, largest = self.radius.ravel()[cells], 0.25 * len(self.radius)
+        closed = self._discs(cells, np.minimum(radii, largest))
         while largest > 1 and closed.mean() > _MOST_CLOSED:
             largest /= 2
-            closed = self._discs(self.summits[chosen], np.minimum(self.radius[chosen], largest), grid)
-        closed.ravel()[cells] = True
-        return np.flatnonzero(closed)
+            closed = self._discs(cells, np.minimum(radii, largest))
+        return closed
 
-    @staticmethod
-    def _discs(cells, radii, grid):
+    def _discs(self, cells, radii):
         """Return a mask, (n, n), of discs around some cells, (k,) int; the grid is periodic."""
-        closed = np.zeros((grid, grid), bool)
-        for cell, radius in zip(cells, radii, strict=True):
+        closed, grid = np.zeros(self.radius.shape, bool), len(self.radius)
+        closed.ravel()[cells] = True
+        for cell, radius in zip(cells[radii >= 1], radii[radii >= 1], strict=True):
             offset = np.arange(-int(radius), int(radius) + 1)
             rows, columns = np.nonzero(np.hypot(offset[:, None], offset) <= radius)
             row, column = divmod(int(cell), grid)

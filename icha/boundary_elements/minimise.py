@@ -16,13 +16,15 @@ Lengths are in units of the cell size, pressures in E*.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, minres
 
 from icha.boundary_elements.elastic import HalfSpace
 from icha.boundary_elements.laws import AtDistance, Bonds, ShortRange, with_neighbours
+from icha.boundary_elements.window import Window
 from icha.contact.model import NotConverged
 
 # Largest residual pressure at which new contact forms and closed cells open, relative to the peak tension of the bonds
@@ -55,16 +57,42 @@ class Control:
 
 
 @dataclass(frozen=True, eq=False)
+class Problem:
+    """A rough surface and an elastic body.
+
+    Parameters
+    ----------
+    space, law : elastic body, with a grid of n x n cells, and law of attraction of m x m cells.
+    heights : (m, m), heights of the rough surface. The other cells of the body have no heights and carry no pressure;
+        there are none of them on a periodic surface.
+    """
+
+    space: HalfSpace
+    law: AtDistance | ShortRange
+    heights: np.ndarray
+
+    def part(self, window: Window) -> Problem:
+        """Return the problem on the cells of a window."""
+        law: Any = self.law
+        fields = {name: window.of(value) for name, value in vars(law).items() if isinstance(value, np.ndarray)}
+        return Problem(self.space.part(window.grid), replace(law, **fields), window.of(self.heights))
+
+    def crop(self, field: np.ndarray) -> np.ndarray:
+        """Return the view, (m, m), of a field of the body, (n, n)."""
+        return field[: len(self.heights), : len(self.heights)]
+
+
+@dataclass(frozen=True, eq=False)
 class Equilibrium:
     """Equilibrium of the body under the rough surface.
 
     Parameters
     ----------
     position : (n, n), position v of the surface of the body at each cell.
-    fraction : (n, n), fraction of contact of each cell.
-    pressure : (n, n), pressure on each cell, in E*.
+    fraction : (m, m), fraction of contact of each cell.
+    pressure : (m, m), pressure on each cell, in E*.
     load : mean pressure P of the grid, in E*.
-    held : (n, n) bool, cells whose gap is zero and stays zero.
+    held : (m, m) bool, cells whose gap is zero and stays zero.
     residual : largest residual pressure, relative to the peak tension of the bonds or, without attraction, to the
         largest pressure.
     gap_residual : largest displacement by the residual pressures.
@@ -84,21 +112,15 @@ class Equilibrium:
 
 
 def minimise(
-    space: HalfSpace,
-    law: AtDistance | ShortRange,
-    heights: np.ndarray,
-    position: np.ndarray,
-    fraction: np.ndarray,
-    control: Control,
-    tolerance: float,
+    problem: Problem, position: np.ndarray, fraction: np.ndarray, control: Control, tolerance: float
 ) -> Equilibrium:
     """Find the equilibrium from a start, by steps that lower the energy.
 
     Parameters
     ----------
-    space, law : elastic body and law of attraction.
-    heights : (n, n), heights of the rough surface; -inf in the margin of a free square.
-    position, fraction : (n, n), positions of the surface of the body, and fractions of contact, to start from.
+    problem : elastic body, law of attraction and heights.
+    position, fraction : (n, n) and (m, m), positions of the surface of the body, and fractions of contact, to start
+        from.
     control : what is given.
     tolerance : largest displacement by the residual pressures, in cell sizes.
 
@@ -107,8 +129,9 @@ def minimise(
     NotConverged
         After too many iterations, or if no step lowers the energy.
     """
-    now, last, refused = _start(space, law, heights, position, fraction, control), None, 0
-    closed, opened, pending = np.zeros(heights.shape, bool), np.zeros(heights.shape, bool), 0
+    space, law = problem.space, problem.law
+    now, last, refused = _start(problem, position, fraction, control), None, 0
+    closed, opened, pending = np.zeros(fraction.shape, bool), np.zeros(fraction.shape, bool), 0
     # Cells inside a short-ranged contact of a calm state; cells that close for a moment must be free to open.
     locked = ~with_neighbours(fraction < 1) if law.holds_inside else opened
     # The loop of the solver.
@@ -116,39 +139,38 @@ def minimise(
         # Residual pressures; a cell is held closed under pressure, and where it is locked.
         is_open = now.gap > 0
         load = _load(space, control, now, is_open)
-        r, inside = now.force - load, locked
+        r, pressure, inside = now.force - load, problem.crop(now.pressure) + load, locked
         if law.holds_inside:
             inside = locked & ~(with_neighbours(is_open) | opened)
-        held = ~is_open & (r <= 0) | inside
-        r *= ~held
-        largest = law.straight_strength or max(float(np.abs(now.pressure + load).max()), tolerance / _CALM)
+        held = ~is_open & (problem.crop(r) <= 0) | inside
+        problem.crop(r)[held] = 0.0
+        largest = law.straight_strength or max(float(np.abs(pressure).max()), tolerance / _CALM)
         error = float(np.abs(r).max()) / largest
         if error <= _CALM:
             if law.holds_inside:
                 locked = ~with_neighbours(is_open)
             # Each cell closes, and opens, at most once, so that the number of changes is limited.
             closing = law.within_reach(now.gap, now.field)
-            opening, pending = inside & (now.pressure + load < -law.strength), len(closing)
+            opening, pending = inside & (pressure < -law.strength), len(closing)
             closing = closing[~closed.ravel()[closing]]
             if len(closing) or opening.any():
                 closed.ravel()[closing], opened, pending = True, opened | opening, pending - len(closing)
-                now, last = _with_contact(space, law, heights, control, now, closing), None
+                now, last = _with_contact(problem, control, now, closing), None
                 continue
         # Direction of steepest descent in the norm of the elastic energy, then conjugate to the last direction.
         z = space.displacement(r)
         gap_error = float(np.abs(z).max())
-        if gap_error <= tolerance and error <= _CALM and _meets_load(control, now.pressure + load, r):
-            pressure = now.pressure + load
+        if gap_error <= tolerance and error <= _CALM and _meets_load(control, pressure, r):
             return Equilibrium(now.position, now.field, pressure, load, held, error, gap_error, pending, iteration)
-        z = _restrict(z, ~held, control)
-        d = _conjugate(z, r, last, ~held, control)
+        z = _restrict(z, held, control)
+        d = _conjugate(z, r, last, held, control)
         # Step along the direction; a step that would raise the energy is shortened.
-        found = _Line(space, law, heights, control, now, r, d).search()
+        found = _Line(problem, control, now, r, d).search()
         if found is None:
             refused, last = refused + 1, None
             if refused > _REFUSALS:
                 raise NotConverged(f"no step lowers the energy; residual {error:.1e}")
-            now = _Point.of(law, now.position, now.gap, now.pressure, now.bonds)
+            now = _Point.of(problem, now.position, now.gap, now.pressure, now.bonds)
             continue
         now, refused, last = found, 0, (d, r, float(np.vdot(r, z)))
     # The end of the loop.
@@ -159,7 +181,8 @@ def minimise(
 class _Point:
     """Position of the surface of the body, and what follows from it.
 
-    position, gap, pressure : (n, n), positions, gaps, and pressures without the load.
+    position, pressure : (n, n), positions, and pressures without the load.
+    gap : (m, m), gaps.
     bonds : attraction of the cells.
     force : (n, n), minus pressure and tension: without load, it opens a gap if it is positive.
     """
@@ -171,46 +194,43 @@ class _Point:
     force: np.ndarray
 
     @classmethod
-    def of(cls, law, position, gap, pressure, bonds):
+    def of(cls, problem, position, gap, pressure, bonds):
         """Return the point with these positions; the works of adhesion of given bonds follow their fractions."""
-        for _ in range(law.rounds):
-            bonds = law.bonds(bonds.field(bonds.fraction(bonds.at(gap)), gap.shape))
+        for _ in range(problem.law.rounds):
+            bonds = problem.law.bonds(bonds.field(bonds.fraction(bonds.at(gap)), gap.shape))
         force = -pressure
-        force.ravel()[bonds.cells] -= bonds.tension(bonds.at(gap))
+        problem.crop(force)[...] -= bonds.field(bonds.tension(bonds.at(gap)), gap.shape)
         return cls(position, gap, pressure, bonds, force)
 
     @property
     def field(self):
-        """Fractions of all cells, (n, n)."""
+        """Fractions of all cells, (m, m)."""
         return self.bonds.field(self.bonds.fraction(self.bonds.at(self.gap)), self.gap.shape)
 
 
-def _start(space, law, heights, position, fraction, control):
+def _start(problem, position, fraction, control):
     """Return the point from which the iteration starts."""
-    position, gap, _ = _project(position, heights, control)
-    return _Point.of(law, position, gap, space.pressure(position), law.bonds(fraction))
+    position = position.copy()
+    gap, _ = _project(problem, position, control)
+    return _Point.of(problem, position, gap, problem.space.pressure(position), problem.law.bonds(fraction))
 
 
-def _with_contact(space, law, heights, control, point, cells):
+def _with_contact(problem, control, point, cells):
     """Return a point with contact also in further cells, (k,) int, and with the same mean position if it is given."""
     if not len(cells):
-        return _Point.of(law, point.position, point.gap, point.pressure, law.bonds(point.field))
-    cells, field, position = law.closing(cells, len(heights)), point.field, point.position.copy()
-    field.ravel()[cells] = 1.0
+        return _Point.of(problem, point.position, point.gap, point.pressure, problem.law.bonds(point.field))
     # Heights minus infinity are outside a shape.
-    cells = cells[np.isfinite(heights.ravel()[cells])]
-    position.ravel()[cells] = heights.ravel()[cells]
-    position, gap, _ = _project(position, heights, control)
-    return _Point.of(law, position, gap, space.pressure(position), law.bonds(field))
+    closing = problem.law.closing(cells) & np.isfinite(problem.heights)
+    position = point.position.copy()
+    problem.crop(position)[closing] = problem.heights[closing]
+    return _start(problem, position, np.where(closing, 1.0, point.field), control)
 
 
 @dataclass(frozen=True, eq=False)
 class _Line:
     """Search for the length of a step from a point `now` with residuals r along a direction d, (n, n) each."""
 
-    space: HalfSpace
-    law: AtDistance | ShortRange
-    heights: np.ndarray
+    problem: Problem
     control: Control
     now: _Point
     r: np.ndarray
@@ -222,12 +242,12 @@ class _Line:
         The first length is that of Newton with constant works of adhesion; the second one follows from the residuals at
         the first. If both raise the energy, the length becomes shorter.
         """
-        stiff_d, slope = self.space.pressure(self.d), float(np.vdot(self.r, self.d))
+        stiff_d, slope = self.problem.space.pressure(self.d), float(np.vdot(self.r, self.d))
         # Without contact there may be no stiffness: at most the largest gap closes.
         longest = np.inf
         if self.now.gap.min() > 0:
             largest_gap = np.max(self.now.gap, where=self.now.gap < np.inf, initial=0.0)
-            longest = float(largest_gap) / max(-float(self.d.min()), _TINY)
+            longest = float(largest_gap) / max(-float(self.problem.crop(self.d).min()), _TINY)
         curvature = self._curvature(stiff_d)
         length = slope / curvature if curvature * longest > slope else longest
         if not length < np.inf:
@@ -252,8 +272,9 @@ class _Line:
         """Return the curvature of the energy along d with constant works, or that of the elastic energy."""
         bonds, d, stiffness = self.now.bonds, self.d, np.vdot(self.d, stiff_d)
         if self.control.rigid is not None:
-            stiffness += d.sum() ** 2 / d.size / self.space.mean_compliance
-        curvature = stiffness - np.sum(bonds.softening(bonds.at(self.now.gap)) * bonds.at(d) ** 2)
+            stiffness += d.sum() ** 2 / d.size / self.problem.space.mean_compliance
+        change = bonds.at(self.problem.crop(d))
+        curvature = stiffness - np.sum(bonds.softening(bonds.at(self.now.gap)) * change**2)
         return float(curvature if curvature > _LEAST_CURVATURE * stiffness else stiffness)
 
     def _try(self, length, stiff_d):
@@ -261,13 +282,13 @@ class _Line:
 
         The energy falls by the mean residual times the change of position, and by what the mean tension leaves.
         """
-        now, bonds = self.now, self.now.bonds
-        position, gap, cut = _project(now.position + length * self.d, self.heights, self.control)
-        pressure = self.space.pressure(position) if cut else now.pressure + length * stiff_d
-        point, change = _Point.of(self.law, position, gap, pressure, bonds), position - now.position
-        r = point.force - _load(self.space, self.control, point, None)
+        now, problem, position = self.now, self.problem, self.now.position + length * self.d
+        gap, cut = _project(problem, position, self.control)
+        pressure = problem.space.pressure(position) if cut else now.pressure + length * stiff_d
+        point, change = _Point.of(problem, position, gap, pressure, now.bonds), position - now.position
+        r = point.force - _load(problem.space, self.control, point, None)
         fall = 0.5 * np.vdot(self.r + r, change)
-        fall -= bonds.energy_beyond_mean_tension(*map(bonds.at, (now.gap, gap, change)))
+        fall -= now.bonds.energy_beyond_mean_tension(*map(now.bonds.at, (now.gap, gap, problem.crop(change))))
         return point, cut, float(np.vdot(r, self.d)), float(fall)
 
 
@@ -279,7 +300,7 @@ def _meets_load(control, pressure, r):
     return abs(float(r.sum())) <= _LOAD_ERROR * load
 
 
-def _conjugate(z, r, last, free, control):
+def _conjugate(z, r, last, held, control):
     """Return the next direction, (n, n), from the steepest descent z, by the formula of Polak and Ribiere.
 
     last : direction, residual and <r, z> of the last step; None to start anew.
@@ -288,85 +309,70 @@ def _conjugate(z, r, last, free, control):
         return z
     direction, before, product = last
     share = max(0.0, float(np.vdot(r, z) - np.vdot(before, z)) / product)
-    d = _restrict(z + share * direction, free, control)
+    d = _restrict(z + share * direction, held, control)
     return d if np.vdot(r, d) > 0 else z
 
 
-def _restrict(change, free, control):
-    """Return a change of the positions of free cells only, which keeps a given mean."""
-    change = change * free
+def _restrict(change, held, control):
+    """Set a change of the positions, (n, n), to zero where cells are held, (m, m), and keep a given mean; return it."""
+    change[: len(held), : len(held)][held] = 0.0
     if control.mean is not None:
-        change -= change.sum() / max(np.count_nonzero(free), 1) * free
+        change -= change.sum() / max(np.count_nonzero(~held), 1) * ~held
     return change
 
 
-def rates(
-    space: HalfSpace, law, heights, found: Equilibrium, accuracy: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the changes of position, pressure and fraction, (n, n) each, when the separation grows by one cell size.
+def rates(problem: Problem, found: Equilibrium, accuracy: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the changes of pressure and fraction, (m, m) each, when the separation grows by one cell size.
 
     The separation is the mean of the positions or, on a free square, the rigid approach.
     """
-    bonds, free = law.bonds(found.fraction), ~found.held
-    gap = bonds.at(found.position - heights)
-    tangent = law.tangent(bonds, bonds.at(found.fraction), gap, len(heights))
-    if space.free:
-        control, start = Control(rigid=0.0), np.zeros(heights.shape)
-        force = np.where(free, 1 / space.mean_compliance, 0.0)
-    else:
-        control, start = Control(mean=0.0), free * (free.size / np.count_nonzero(free))
-        force = -_tangent_pressure(space, tangent, start) * free
-    change = start + _response(space, tangent, free, control, force, accuracy)
-    pressure, fraction = space.pressure(change), np.zeros(heights.shape)
+    space, bonds, gap = problem.space, problem.law.bonds(found.fraction), problem.crop(found.position) - problem.heights
+    tangent = problem.law.tangent(bonds, bonds.at(found.fraction), bonds.at(gap), len(gap))
+    control = Control(rigid=0.0) if space.free else Control(mean=0.0)
+
+    def stiffness(change, rigid=0.0):
+        pressure = space.pressure(change)
+        problem.crop(pressure)[...] += tangent.field(tangent.changes(problem.crop(change))[1], gap.shape)
+        return pressure + (change.mean() - rigid) / space.mean_compliance if space.free else pressure
+
+    def of_free_cells(operator):
+        def restricted(change):
+            change = _restrict(change.reshape(found.position.shape).copy(), found.held, control)
+            return _restrict(operator(change), found.held, control).ravel()
+
+        return LinearOperator((found.position.size,) * 2, matvec=restricted, dtype=float)
+
+    # Free cells follow first, so that only the remaining change is solved.
+    start = _restrict(np.ones(found.position.shape), found.held, Control())
+    if not space.free:
+        start /= start.mean()
+    force = _restrict(-stiffness(start, 1.0), found.held, control)
+    change, _ = minres(of_free_cells(stiffness), force.ravel(), M=of_free_cells(space.displacement), rtol=accuracy)
+    change = start + change.reshape(start.shape)
+    pressure = space.pressure(change)
     if space.free:
         pressure += (change.mean() - 1) / space.mean_compliance
     else:
-        pressure -= _tangent_pressure(space, tangent, change)[free].mean()
-    fraction.ravel()[tangent.cells] = tangent.changes(change)[0]
-    return change, pressure, fraction
+        pressure -= stiffness(change)[~found.held].mean()
+    return problem.crop(pressure), tangent.field(tangent.changes(problem.crop(change))[0], gap.shape)
 
 
-def _tangent_pressure(space, tangent, change):
-    """Return the change of pressure plus tension for a change of the positions, (n, n), at constant load."""
-    pressure = space.pressure(change)
-    pressure.ravel()[tangent.cells] += tangent.changes(change)[1]
-    return pressure
-
-
-def _response(space, tangent, free, control, force, accuracy):
-    """Return the change of the positions of free cells, (n, n), under a small additional force, by the tangent."""
-    shape, size = free.shape, free.size
-
-    def stiffness(change):
-        change = _restrict(change.reshape(shape), free, control)
-        pressure = _tangent_pressure(space, tangent, change)
-        if control.rigid is not None:
-            pressure += change.mean() / space.mean_compliance
-        return _restrict(pressure, free, control).ravel()
-
-    def compliance(pressure):
-        return _restrict(space.displacement(_restrict(pressure.reshape(shape), free, control)), free, control).ravel()
-
-    operator, inverse = (LinearOperator((size, size), matvec=each, dtype=float) for each in (stiffness, compliance))
-    change, _ = minres(operator, _restrict(force, free, control).ravel(), M=inverse, rtol=accuracy)
-    return change.reshape(shape)
-
-
-def _project(position, heights, control):
-    """Return positions that are not below the heights, their gaps, and whether a position has changed.
+def _project(problem, position, control):
+    """Move positions, (n, n), that are below the heights; return the gaps, (m, m), and whether a position has moved.
 
     A given mean position is restored: all gaps change by one factor.
     """
+    heights, position = problem.heights, problem.crop(position)
     cut = bool((position < heights).any())
     if cut:
-        position = np.maximum(position, heights)
+        np.maximum(position, heights, out=position)
     gap = position - heights
     if control.mean is not None:
         factor = (control.mean - heights.mean()) / gap.mean()
         if cut or abs(factor - 1) > _SAME_MEAN:
             gap *= factor
-            position, cut = heights + gap, True
-    return position, gap, cut
+            position[...], cut = heights + gap, True
+    return gap, cut
 
 
 def _load(space, control, point, is_open):

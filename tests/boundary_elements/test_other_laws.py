@@ -11,7 +11,7 @@ from icha.asperity.jkr import JKR
 from icha.boundary_elements.contact import contact_of
 from icha.boundary_elements.elastic import HalfSpace
 from icha.boundary_elements.laws import AtDistance, Cohesive, ShortRange, average
-from icha.boundary_elements.minimise import Control, minimise
+from icha.boundary_elements.minimise import Control, Problem, minimise
 
 MODULUS, GRID = 1e6, 64
 SURFACE = icha.SelfAffineSpectrum(1e-4, 5e-5, 1e-4 / 8, 0.8, 0.1).realise(GRID, 1)
@@ -75,7 +75,8 @@ def exponential_law(material):
 def solve(law, control, start=None):
     """Find the equilibrium from a position, (n, n), or from a flat body that touches the highest cell."""
     position = np.full(HEIGHTS.shape, HEIGHTS.max()) if start is None else start
-    return minimise(HalfSpace.under(GRID), law, HEIGHTS, position, np.zeros(HEIGHTS.shape), control, TOLERANCE)
+    problem = Problem(HalfSpace.under(GRID), law, HEIGHTS)
+    return minimise(problem, position, np.zeros(HEIGHTS.shape), control, TOLERANCE)
 
 
 @pytest.mark.parametrize(("adhesion", "reach"), [(0.05, 0.3), (0.3, 0.3), (1, 1)])
@@ -111,15 +112,17 @@ def contact_with_factors(attraction, factors):
         return dataclasses.replace(contact, attraction=Cohesive(law.adhesion_length * factors, law.strength))
     material = material_of(0.03, 1e-6)
     contact = contact_of(SURFACE, material)
-    law, jump_in, radius = contact.attraction, [], []
-    for cell, curvature_radius in zip(law.summits, contact.asperities.radius_of_curvature, strict=True):
-        work = material.surface_energy * factors.ravel()[cell]
-        summit = JKR(dataclasses.replace(material, surface_energy=work))
-        approach = summit.jump_in_approach(curvature_radius)
-        jump_in.append(-approach / SURFACE.spacing)
-        radius.append(summit.contact_radius(approach, curvature_radius) / SURFACE.spacing)
-    summits = law.summits, law.above, np.array(jump_in), np.array(radius)
-    striped = ShortRange(law.adhesion_length * factors, law.strength, *summits)
+    law, summits = contact.attraction, contact.summit_cells
+    jump_in, radius = law.jump_in.copy(), law.radius.copy()
+    for cell, curvature_radius in zip(summits, contact.asperities.radius_of_curvature, strict=True):
+        before, after = (
+            JKR(dataclasses.replace(material, surface_energy=material.surface_energy * factor))
+            for factor in (1.0, factors.ravel()[cell])
+        )
+        approach = after.jump_in_approach(curvature_radius)
+        jump_in.ravel()[cell] += (before.jump_in_approach(curvature_radius) - approach) / SURFACE.spacing
+        radius.ravel()[cell] = after.contact_radius(approach, curvature_radius) / SURFACE.spacing
+    striped = ShortRange(law.adhesion_length * factors, law.strength, jump_in, radius)
     return dataclasses.replace(contact, attraction=striped)
 
 
@@ -163,7 +166,7 @@ def test_pressure_is_the_slope_of_the_energy(attraction, factors):
 
     def solve_near(change):
         start, control = (first.position + change, first.fraction), Control(mean=1.2 * UNIT + change)
-        return minimise(contact.space, law, HEIGHTS, *start, control, TOLERANCE)
+        return minimise(Problem(contact.space, law, HEIGHTS), *start, control, TOLERANCE)
 
     def energy(found):
         elastic = 0.5 * np.sum(found.pressure * (HEIGHTS - found.position.mean()))
