@@ -16,105 +16,66 @@ from icha.contact.models import DEFAULT_MODEL
 from icha.datasets.files import read_campaign
 from validation.tables import Table, copy_figures, means, write_tables
 
+_AREA, _PULL_OFF, _LOSS = "largest_contact_area_fraction", "pull_off_pressure", "hysteresis_loss_over_surface_energy"
+_WORDS = {_AREA: "A/A₀", _PULL_OFF: "pull-off, Pa", _LOSS: "loss/Δγ"}
+_FORMS = {_AREA: "{:.3g}", _PULL_OFF: "{:.3g}", _LOSS: "{:.4f}"}
 
-def _cells(study):
-    """Yield rms slope, material, and the runs of the study with both."""
+
+def _adhesive_runs(study):
+    """Yield rms slope, energy in mJ/m^2, and the runs with both, of the asperity model on the first surface."""
+    runs = study.sel(model=DEFAULT_MODEL).isel(surface=0)
     for slope in study["rms_slope"].values:
-        for material in study["material"].values:
-            yield float(slope), str(material), _asperity_runs(study, slope).sel(material=material)
+        for material in study["material"].values[study["surface_energy"].values > 0]:
+            one = runs.sel(rms_slope=slope, material=material)
+            yield float(slope), f"{1e3 * float(one['surface_energy']):g}", one
 
 
-def _asperity_runs(study, slope):
-    """Return the runs of the asperity model on the first surface at a slope."""
-    return study.sel(model=DEFAULT_MODEL, rms_slope=slope).isel(surface=0)
-
-
-def _adhesive(study):
-    return study.sel(material=study["surface_energy"].values > 0)
-
-
-def _mean(values, form="{:.3g}"):
+def _mean(values, form):
     """Format mean ± standard deviation over the seeds."""
-    return means([np.array([value]) for value in np.atleast_1d(values)], form)[0]
-
-
-def _energy(one):
-    return f"{1e3 * float(one['surface_energy']):g}"
+    return means(np.atleast_1d(values)[:, None], form)[0]
 
 
 def summary(study: xr.Dataset) -> Table:
     """Table of pull-off and loss for each slope and surface energy."""
     head = ["h′rms", "Δγ, mJ/m²", "stickiness", "A/A₀", "pull-off, Pa", "over all summits", "loss/Δγ"]
     rows = []
-    for slope, _, one in _cells(_adhesive(study)):
-        rows.append(
-            [
-                f"{slope:g}",
-                _energy(one),
-                f"{float(one['stickiness'].mean()):.2g}",
-                _mean(one["largest_contact_area_fraction"].values),
-                _mean(one["pull_off_pressure"].values),
-                _mean(one["pull_off_over_summits"].values, "{:.4f}"),
-                _mean(one["hysteresis_loss_over_surface_energy"].values, "{:.4f}"),
-                _mean(one["loss_by_jump_in"].values / one["loss_by_jump_off"].values, "{:.1f}"),
-            ]
-        )
+    for slope, energy, one in _adhesive_runs(study):
+        values = {_AREA: "{:.3g}", _PULL_OFF: "{:.3g}", "pull_off_over_summits": "{:.4f}", _LOSS: "{:.4f}"}
+        cells = [_mean(one[name].values, form) for name, form in values.items()]
+        ratio = _mean(one["loss_by_jump_in"].values / one["loss_by_jump_off"].values, "{:.1f}")
+        rows.append([f"{slope:g}", energy, f"{float(one['stickiness'].mean()):.2g}", *cells, ratio])
     return Table([*head, "jump-in : jump-off"], rows)
 
 
 def largest_loads(studies: Sequence[xr.Dataset]) -> Table:
-    """Table of pull-off and loss against the largest load, for the first slope in all studies."""
+    """Table of pull-off and loss against the largest load, for the first slope and the materials in all studies."""
     slope = min(set.intersection(*(set(study["rms_slope"].values.tolist()) for study in studies)))
-    studies = [_asperity_runs(study, slope) for study in studies]
-    studies.sort(key=lambda study: float(study["largest_reduced_pressure"].mean()))
-    head = ["Δγ, mJ/m²", "", *(f"p\\* = {float(s['largest_reduced_pressure'].mean()):.2g}" for s in studies), ""]
-    rows = []
-    materials = [m for m in studies[0]["material"].values if all(m in s["material"].values for s in studies)]
-    for material in materials:
-        runs = [study.sel(material=material) for study in studies]
-        if not float(runs[0]["surface_energy"]) > 0:
-            continue
-        area, loss, pull = (
-            np.array([float(one[name].mean()) for one in runs])
-            for name in ("largest_contact_area_fraction", "hysteresis_loss_over_surface_energy", "pull_off_pressure")
-        )
-        fit = np.polyfit(area, loss, 1)
-        r2 = 1 - np.sum((loss - np.polyval(fit, area)) ** 2) / np.sum((loss - loss.mean()) ** 2)
+    found = [{energy: one for at, energy, one in _adhesive_runs(study) if at == slope} for study in studies]
+    found.sort(key=lambda runs: float(next(iter(runs.values()))["largest_reduced_pressure"].mean()))
+    rows, loads = [], [float(next(iter(runs.values()))["largest_reduced_pressure"].mean()) for runs in found]
+    for energy in (each for each in found[0] if all(each in runs for runs in found)):
+        runs = [each[energy] for each in found]
+        area, pull, loss = (np.array([float(one[name].mean()) for one in runs]) for name in _WORDS)
+        residual = loss - np.polyval(np.polyfit(area, loss, 1), area)
+        r2 = 1 - np.sum(residual**2) / np.sum((loss - loss.mean()) ** 2)
         power = f"n = {np.polyfit(np.log(area), np.log(loss), 1)[0]:.2f}" if np.all(loss > 0) else "n –"
-        label = _energy(runs[0])
-        rows += [
-            [label, "A/A₀", *(_mean(one["largest_contact_area_fraction"].values) for one in runs), ""],
-            [
-                label,
-                "loss/Δγ",
-                *(_mean(one["hysteresis_loss_over_surface_energy"].values, "{:.4f}") for one in runs),
-                f"{power}, r² = {r2:.3f}",
-            ],
-            [
-                label,
-                "pull-off, Pa",
-                *(_mean(one["pull_off_pressure"].values) for one in runs),
-                f"varies by {100 * (pull.max() / pull.min() - 1):.0f} %",
-            ],
-        ]
-    return Table(head, rows)
+        notes = {_AREA: "", _LOSS: f"{power}, r² = {r2:.3f}"}
+        notes |= {_PULL_OFF: f"varies by {100 * (pull.max() / pull.min() - 1):.0f} %"}
+        for name, note in notes.items():
+            rows.append([energy, _WORDS[name], *(_mean(one[name].values, _FORMS[name]) for one in runs), note])
+    return Table(["Δγ, mJ/m²", "", *(f"p\\* = {load:.2g}" for load in loads), ""], rows)
 
 
 def controls(separation: xr.Dataset, load: xr.Dataset) -> Table:
     """Table of the same runs under separation and under load control."""
     head = ["Δγ, mJ/m²", "pull-off, Pa: separation", "load", "last contact at, Pa: separation", "load"]
+    forms = {_PULL_OFF: "{:.4g}", "detachment_pressure": "{:.3g}", _LOSS: "{:.4f}"}
+    others = {(slope, energy): one for slope, energy, one in _adhesive_runs(separation)}
     rows = []
-    for slope, material, one in _cells(_adhesive(load)):
-        one = one.isel(seed=0)
-        other = _asperity_runs(separation, slope).sel(material=material, seed=int(one["seed"]))
-        row = [_energy(one)]
-        for name, form in (
-            ("pull_off_pressure", "{:.4g}"),
-            ("detachment_pressure", "{:.3g}"),
-            ("hysteresis_loss_over_surface_energy", "{:.4f}"),
-        ):
-            row += [form.format(float(each[name])) for each in (other, one)]
-        rows.append(row)
+    for slope, energy, runs in _adhesive_runs(load):
+        one = runs.isel(seed=0)
+        pair = others[slope, energy].sel(seed=int(one["seed"])), one
+        rows.append([energy, *(form.format(float(each[name])) for name, form in forms.items() for each in pair)])
     return Table([*head, "loss/Δγ: separation", "load"], rows)
 
 

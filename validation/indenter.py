@@ -9,52 +9,38 @@ in validation/results/indenter, and the tables are written from them; with `--ta
 
 from __future__ import annotations
 
-import argparse
-import json
-import math
-import time
-from collections.abc import Callable, Iterable
-from pathlib import Path
-
-import numpy as np
-from threadpoolctl import threadpool_limits
+from functools import partial
+from itertools import product
 
 from validation import indenter_contacts as single
 from validation import rough_indenters as rough
-from validation.tables import Table, by, percent, write_tables
+from validation.measurements import Parts, Rows, measure_page, read_rows
+from validation.tables import Table, by, by_radius, worst
 
-RESULTS = Path(__file__).resolve().parent / "results/indenter"
 # Cell sizes and grids: the contact of zero load has a radius of 6 to 20 cells.
 _GRIDS = ((1 / 4, 64), (1 / 6, 96), (1 / 9, 128))
 
-
-def _rows(solve: Callable, arguments: Iterable[tuple]):
-    """Yield the rows of a function for several tuples of arguments."""
-    for each in arguments:
-        found = solve(*each)
-        yield from [found] if isinstance(found, dict) else found
-
-
-PARTS: dict[str, Callable] = {
-    "hertz": lambda: _rows(single.hertz, [(c, place) for c in (4, 8, 12, 20) for place in single.PLACES]),
-    "sphere": lambda: _rows(
+PARTS: Parts = {
+    "hertz": (single.hertz, [*product((4, 8, 12, 20), single.PLACES)]),
+    "sphere": (
         single.sphere,
-        [(*grid, place, how, 4.0) for grid in _GRIDS for place in single.PLACES for how in ("separation", "load")],
+        [(*grid, *others, 4.0) for grid, *others in product(_GRIDS, single.PLACES, ("separation", "load"))],
     ),
-    "pull_off": lambda: _rows(single.sphere_pull_off, [(*grid, place) for grid in _GRIDS for place in single.PLACES]),
-    "punch": lambda: _rows(single.punch, [(cells, square) for square in (False, True) for cells in (8, 12, 16)]),
-    "cone": lambda: _rows(single.cone, [(1 / 2,), (1 / 4, 144)]),
-    "ellipse": lambda: _rows(single.ellipse, [(1 / 8, 2.0), (1 / 8, 4.0)]),
-    "wave": lambda: _rows(single.guduru, [(1 / 16, 0.25, 1.5), (1 / 16, 0.1, 1.0)]),
-    "along": lambda: _rows(single.ripples_along, [(20, 6), (20, 10), (30, 10), (40, 10), (40, 14)]),
-    "across": lambda: _rows(single.ripples_across, [(1 / 16, 0.1, 1.0), (1 / 24, 0.1, 1.0)]),
-    "without_adhesion": lambda: _rows(rough.without_adhesion, [("sphere",), ("rough square",), ("layer",)]),
-    "layer_limits": lambda: rough.layer_limits(),
-    "balance": lambda: _rows(rough.conformal_sphere, [(0.05, 1), (0.1, 2), (0.15, 3), (0.2, 4), (0.3, 5)]),
-    "convergence": lambda: _rows(rough.rough_loop, [(64,), (128,), (256,)]),
-    "smooth_loop": lambda: [rough.smooth_loop()],
-    "direction": lambda: _rows(
-        rough.directed_sphere, [(1 / 4, 3, 3.0), (1 / 5, 3, 3.0), (1 / 4, 10, 3.0), (1 / 5, 10, 3.0), (1 / 4, 10, 4.0)]
+    "pull_off": (single.sphere_pull_off, [(*grid, place) for grid, place in product(_GRIDS, single.PLACES)]),
+    "punch": (single.punch, [(cells, square) for square, cells in product((False, True), (8, 12, 16))]),
+    "cone": (single.cone, [(1 / 2,), (1 / 4, 144)]),
+    "ellipse": (single.ellipse, [(1 / 8, 2.0), (1 / 8, 4.0)]),
+    "wave": (single.guduru, [(1 / 16, 0.25, 1.5), (1 / 16, 0.1, 1.0)]),
+    "along": (single.ripples_along, [(20, 6), (20, 10), (30, 10), (40, 10), (40, 14)]),
+    "across": (single.ripples_across, [(1 / 16, 0.1, 1.0), (1 / 24, 0.1, 1.0)]),
+    "without_adhesion": (rough.without_adhesion, [("sphere",), ("rough square",), ("layer",)]),
+    "layer_limits": (rough.layer_limits, [()]),
+    "balance": (rough.conformal_sphere, [(0.05, 1), (0.1, 2), (0.15, 3), (0.2, 4), (0.3, 5)]),
+    "convergence": (rough.rough_loop, [(64,), (128,), (256,)]),
+    "smooth_loop": (rough.smooth_loop, [()]),
+    "direction": (
+        rough.directed_sphere,
+        [(1 / 4, 3, 3.0), (1 / 5, 3, 3.0), (1 / 4, 10, 3.0), (1 / 5, 10, 3.0), (1 / 4, 10, 4.0)],
     ),
 }
 
@@ -62,11 +48,7 @@ PARTS: dict[str, Callable] = {
 # --- tables -------------------------------------------------------------------------------------------------------
 
 
-def _worst(rows: Iterable[dict], *names: str) -> float:
-    return max(abs(row[name]) for row in rows for name in names if name in row)
-
-
-def bounds(rows: dict[str, list[dict]]) -> Table:
+def bounds(rows: Rows) -> Table:
     """Table of all targets with the measured errors."""
     lines = []
 
@@ -83,17 +65,17 @@ def bounds(rows: dict[str, list[dict]]) -> Table:
                 for part in ("sphere", "pull_off")
             )
             given = [row for row in fine if row["control"] == "separation"]
-            add(f"{what}: force at the radius", _worst(fine, "force_error"), 0.01)
-            add(f"{what}: force at the indentation", _worst(given, "given_error"), 0.01)
-            add(f"{what}: pull-off", _worst(off, "pull_off_error"), 0.005)
+            add(f"{what}: force at the radius", worst(fine, "force_error"), 0.01)
+            add(f"{what}: force at the indentation", worst(given, "given_error"), 0.01)
+            add(f"{what}: pull-off", worst(off, "pull_off_error"), 0.005)
     jumps = [row for row in rows["wave"] if row["control"] == "load"]
-    add("Guduru's waves: force at the jumps under load", _worst(jumps, "force_error"), 0.02)
-    add("wave along the front: stress intensity", _worst(rows["along"], "error"), 0.03)
-    add("wave across the front, 24 cells: stress intensity", _worst(rows["across"][-1:], "amplitude_error"), 0.03)
+    add("Guduru's waves: force at the jumps under load", worst(jumps, "force_error"), 0.02)
+    add("wave along the front: stress intensity", worst(rows["along"], "error"), 0.03)
+    add("wave across the front, 24 cells: stress intensity", worst(rows["across"][-1:], "amplitude_error"), 0.03)
     errors = ("area_error", "gap_error", "force_error")
-    add("ContactMechanics: area, gap and force", _worst(rows["without_adhesion"], *errors), 1e-4, "{:.1g}")
+    add("ContactMechanics: area, gap and force", worst(rows["without_adhesion"], *errors), 1e-4, "{:.1g}")
     layers = [row for row in rows["without_adhesion"] if row["kind"] == "layer"]
-    add("ContactMechanics: compliance of layers", _worst(layers, "kernel_error"), 1e-10, "{:.1g}")
+    add("ContactMechanics: compliance of layers", worst(layers, "kernel_error"), 1e-10, "{:.1g}")
     *coarse, finest = rows["convergence"]
     for row in coarse[1:]:
         error = abs(row["pull_off"] / finest["pull_off"] - 1)
@@ -106,30 +88,15 @@ def bounds(rows: dict[str, list[dict]]) -> Table:
     return Table(["what", "largest error, or time", "target", ""], lines)
 
 
-def cost(rows: dict[str, list[dict]]) -> Table:
+def cost(rows: Rows) -> Table:
     """Table of the computing times of cycles of single indenters, for the page of the benchmarks."""
-    cycles = [("smooth sphere", row) for row in rows["smooth_loop"]] + [
-        ("rough sphere", r) for r in rows["convergence"]
+    cycles = [
+        (f"{what} sphere", row)
+        for what, part in (("smooth", "smooth_loop"), ("rough", "convergence"))
+        for row in rows[part]
     ]
     lines = [[what, f"{row['grid']}²", str(row["steps"]), f"{row['seconds']:.1f} s"] for what, row in cycles]
     return Table(["indenter", "grid", "equilibria", "processor"], lines, numbers=True)
-
-
-def by_radius(rows: list[dict], names: dict[str, str]) -> Table:
-    """Table of the mean and range of errors in classes of the contact radius and of the place of the apex."""
-    lines = []
-    for low, high in ((4, 8), (8, 12), (12, math.inf)):
-        for places, where in ((single.PLACES[::3], "general"), (single.PLACES[1:3], "node, middle")):
-            members = [row for row in rows if low <= row["cells"] < high and tuple(row["place"]) in places]
-            if not members:
-                continue
-            label = f"{low} to {high}" if math.isfinite(high) else f"over {low}"
-            cells = []
-            for name in names:
-                values = np.array([row[name] for row in members])
-                cells.append(f"{percent(values.mean())} ({percent(values.min())} to {percent(values.max())})")
-            lines.append([label, where, str(len(members)), *cells])
-    return Table(["cells in the radius", "apex", "states", *names.values()], lines)
 
 
 _CELLS = {"cells": ("cells in the radius", ".3g")}
@@ -153,6 +120,7 @@ _LIMITS = {
     "thickness": ("thickness over √(Rδ)", ".3g"),
     "cells": ("in cells", ".3g"),
     "area_over": ("A/(πRδ)", ".3f"),
+    "force_error": ("force", "%"),
 }
 _BALANCE = {"energy": ("U_full/Δγ", "g"), "rms_height": ("h_rms", ".3f"), "expected": ("1 − U_full/Δγ", "g")}
 _BALANCE |= {"loading_law": ("loading, law", ".3f"), "unloading_law": ("unloading, law", ".3f")}
@@ -169,7 +137,25 @@ _GRID |= {"pull_off": ("pull-off", ".4f"), "loss": ("loss", ".3f"), "largest_are
 _GRID |= {"seconds": ("time in s", ".1f")}
 
 
-def tables(rows: dict[str, list[dict]]) -> dict[str, Table]:
+# Tables with a line for every row of a part.
+_BY_ROW = {
+    "punch": _PUNCH,
+    "cone": {"adhesion": ("adhesion", "s")}
+    | _CELLS
+    | {"force_error": ("force", "%"), "approach_error": ("indentation", "%")},
+    "along": _ALONG,
+    "across": _ACROSS,
+    "layer_limits": _LIMITS,
+    "balance": _BALANCE,
+    "convergence": _GRID,
+    "direction": _DIRECTION,
+}
+_by_radius = partial(
+    by_radius, edges=(4, 8, 12), places={"general": single.PLACES[::3], "node, middle": single.PLACES[1:3]}
+)
+
+
+def tables(rows: Rows) -> dict[str, Table]:
     """Return all tables of the page from the rows of all parts."""
     ellipses = [row for row in rows["ellipse"] if "cells" in row]
     offs = [row for row in rows["ellipse"] if "pull_off_error" in row]
@@ -179,67 +165,24 @@ def tables(rows: dict[str, list[dict]]) -> dict[str, Table]:
         | {name: "" if row[name] is None else f"{row[name]:.2g}" for name in ("thickness", "poisson", "kernel_error")}
         for row in rows["without_adhesion"]
     ]
+    by_control = {how: [row for row in rows["sphere"] if row["control"] == how] for how in ("separation", "load")}
+    at_radius = {"force_error": "force at the radius", "approach_error": "indentation at the radius"}
+    given = {"separation": "force at the indentation", "load": "indentation at the force"}
     found = {
         "bounds": bounds(rows),
-        "hertz": by_radius(rows["hertz"], {"area_error": "area", "force_error": "force", "gap_error": "gap"}),
-        "separation": by_radius(
-            [row for row in rows["sphere"] if row["control"] == "separation"],
-            {"force_error": "force at the radius", "approach_error": "indentation at the radius"}
-            | {"given_error": "force at the indentation"},
-        ),
-        "load": by_radius(
-            [row for row in rows["sphere"] if row["control"] == "load"],
-            {"force_error": "force at the radius", "approach_error": "indentation at the radius"}
-            | {"given_error": "indentation at the force"},
-        ),
-        "pull_off": by_radius(rows["pull_off"], {"pull_off_error": "pull-off", "jump_off_error": "jump-off"}),
-        "punch": by(rows["punch"], _PUNCH),
-        "cone": by(
-            rows["cone"],
-            {"adhesion": ("adhesion", "s")}
-            | _CELLS
-            | {"force_error": ("force", "%"), "approach_error": ("indentation", "%")},
-        ),
+        "hertz": _by_radius(rows["hertz"], {"area_error": "area", "force_error": "force", "gap_error": "gap"}),
+        **{how: _by_radius(by_control[how], at_radius | {"given_error": given[how]}) for how in given},
+        "pull_off": _by_radius(rows["pull_off"], {"pull_off_error": "pull-off", "jump_off_error": "jump-off"}),
         "ellipse": by(ellipses, model | _CELLS | {"indentation": ("indentation", ".2f")} | _ERRORS),
         "ellipse_pull_off": by(offs, model | {"pull_off_error": ("pull-off", "%")}),
         "wave": by([row for row in rows["wave"] if "force_error" in row], _WAVE),
-        "along": by(rows["along"], _ALONG),
-        "across": by(rows["across"], _ACROSS),
         "without_adhesion": by(others, _OTHER),
-        "layer_limits": by(rows["layer_limits"], _LIMITS | {"force_error": ("force", "%")}),
-        "balance": by(rows["balance"], _BALANCE),
-        "convergence": by(rows["convergence"], _GRID),
-        "direction": by(rows["direction"], _DIRECTION),
+        **{part: by(rows[part], columns) for part, columns in _BY_ROW.items()},
     }
     return {f"indenter_{name}": table for name, table in found.items()} | {"benchmarks_indenter": cost(rows)}
 
 
-def read_measurements() -> dict[str, list[dict]]:
-    """Read the rows of all parts."""
-    return {part: json.loads((RESULTS / f"{part}.json").read_text(encoding="utf-8"))["rows"] for part in PARTS}
-
-
-def main() -> None:
-    """Measure parts, save their numbers, and write the tables."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--parts", nargs="+", choices=PARTS, default=PARTS, metavar="PART", help=", ".join(PARTS))
-    parser.add_argument("--tables", action="store_true", help="write the tables from saved measurements")
-    options = parser.parse_args()
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    for part in () if options.tables else options.parts:
-        print(f"{part} ...", end=" ", flush=True)
-        clock = time.perf_counter()
-        with threadpool_limits(1):
-            rows = list(PARTS[part]())
-        found = {"seconds": round(time.perf_counter() - clock, 1), "rows": rows}
-        text = json.dumps(found, indent=1, default=lambda number: number.item())
-        (RESULTS / f"{part}.json").write_text(text + "\n", encoding="utf-8")
-        print(f"{len(rows)} rows in {found['seconds']:.0f} s", flush=True)
-    if missing := [part for part in PARTS if not (RESULTS / f"{part}.json").exists()]:
-        print(f"no tables written; not measured yet: {', '.join(missing)}")
-    else:
-        write_tables(tables(read_measurements()))
-
+read_measurements = partial(read_rows, "indenter", PARTS)
 
 if __name__ == "__main__":
-    main()
+    measure_page("indenter", PARTS, tables, __doc__)

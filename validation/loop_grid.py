@@ -1,31 +1,29 @@
 """Error of boundary elements due to the grid: pull-off, loss, and areas at light loads.
 
-    python -m validation.loop_grid [--minutes N] [--tables]
+    python -m validation.loop_grid [--parts PART ...] [--tables]
 
-Every surface is the same on all grids: a finer grid interpolates the waves of the coarsest grid. Every run is saved in
-validation/results/loop_grid.json as soon as it is complete, so that a later call continues where this one ends. To
-measure again, for example with another solver, delete this file. `--minutes` is the largest computing time of a call.
+Every surface is the same on all grids: a finer grid interpolates the waves of the coarsest grid. Measurements are saved
+in validation/results/loop_grid, and the tables are written from them; with `--tables` nothing is measured.
 """
 
 from __future__ import annotations
 
-import argparse
-import itertools
-import json
 import math
-import time
 import warnings
-from pathlib import Path
+from collections.abc import Iterator
+from functools import cache, partial
+from itertools import pairwise, product
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 from scipy.optimize import minimize
 
 import icha
 from icha.uncertainty.grid_error import LEAST_MEASURED, LOOP_ERRORS, AreaError, LoopError
-from validation.tables import Table, percent, write_tables
+from validation.measurements import Parts, Rows, measure_page, read_rows
+from validation.tables import Table, percent
 
-RESULTS = Path(__file__).resolve().parent / "results/loop_grid.json"
 _PERIOD, _MODULUS, _SLOPE, _TABOR = 100e-6, 25e6, 0.1, 5.0
 # Cells per shortest wave of the grids, and the cases whose loops are also on the finest grid.
 _COARSEST, CELLS, _FINEST, _ON_FINEST = 8, (8, 16, 32), 64, (0, 1, 2, 3, 5, 9)
@@ -77,38 +75,42 @@ CASES = (
 )
 
 
-def measure_light(case: int, cells: int, adhesive: int) -> dict:
-    """Return areas and numbers of patches at light loads."""
-    surface, material = CASES[case].surface(cells), CASES[case].material(adhesive=bool(adhesive))
-    try:
-        run = icha.simulate(
-            surface, material, icha.Path(reduced_pressures=_LIGHT_PRESSURES, snapshots=[]), model="boundary_elements"
-        )
-    except icha.ConvergenceError as error:  # the last loads lie inside a jump
-        run = error.dataset
-    names = {"reduced_pressure": "step_target", "area": "contact_area_fraction", "patches": "spot_count"}
-    return {name: run[key].values.tolist() for name, key in names.items()}
+def follow(case: int, cells: int, *, adhesive: bool = True, **path):
+    """Return the run of a case on a grid along a path, up to a target that lies inside a jump."""
+    surface, material = CASES[case].surface(cells), CASES[case].material(adhesive=adhesive)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            return icha.simulate(surface, material, icha.Path(snapshots=[], **path), model="boundary_elements")
+        except icha.ConvergenceError as error:
+            return error.dataset
 
 
+def measure_light(case: int, cells: int, adhesive: bool) -> Iterator[dict]:
+    """Yield areas and numbers of patches at light loads; the last loads may lie inside a jump."""
+    run = follow(case, cells, adhesive=adhesive, reduced_pressures=_LIGHT_PRESSURES)
+    of_case = {"case": case, "cells": cells, "adhesive": adhesive}
+    columns = (run[name].values.tolist() for name in ("step_target", "contact_area_fraction", "spot_count"))
+    for load, area, patches in zip(*columns, strict=True):
+        yield of_case | {"load": load, "area": area, "patches": patches}
+
+
+@cache
 def measure_turn(case: int) -> dict:
     """Return the mean separation at which the loops of a case turn on all grids, m, and their largest work, J/m2."""
-    surface, material = CASES[case].surface(_COARSEST), CASES[case].material()
-    path = icha.Path(area_fractions=[_AREA], unload=True, snapshots=[])
-    try:
-        run = icha.simulate(surface, material, path, model="boundary_elements")
-    except icha.ConvergenceError as error:  # this area lies inside a jump
-        run = error.dataset
+    run = follow(case, _COARSEST, area_fractions=[_AREA], unload=True)
     at_target = np.flatnonzero(run["step_kind"] == "area_fraction")
     turn = at_target[0] if len(at_target) else int(run["contact_area_fraction"].argmax())
-    return {"separation": float(run["mean_separation"][turn]), "work": float(abs(run["work"]).max())}
+    return {"case": case, "separation": float(run["mean_separation"][turn]), "work": float(abs(run["work"]).max())}
 
 
-def measure_loop(case: int, cells: int, separation: float) -> dict:
+def measure_loop(case: int, cells: int) -> dict:
     """Return pull-off (Pa) and loss (J/m2) of a loop."""
     surface, material = CASES[case].surface(cells), CASES[case].material()
-    path = icha.Path(mean_separations=[separation], unload=True, snapshots=[])
-    run = icha.simulate(surface, material, path, model="boundary_elements")
+    run = follow(case, cells, mean_separations=[measure_turn(case)["separation"]], unload=True)
     return {
+        "case": case,
+        "cells": cells,
         "length": float((material.surface_energy / _MODULUS * surface.summit_radius**2) ** (1 / 3) / surface.spacing),
         "pull_off": float(run["pull_off_pressure"]),
         "loss": float(run["hysteresis_loss"]),
@@ -117,39 +119,16 @@ def measure_loop(case: int, cells: int, separation: float) -> dict:
     }
 
 
-def read_measurements() -> dict[str, dict]:
-    """Return all saved runs by name."""
-    return json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.exists() else {}
-
-
-def measure(seconds: float) -> None:
-    """Measure and save the runs that the file lacks, in the order of their cost, for at most a computing time."""
-    done, begin = read_measurements(), time.process_time()
-
-    def save(name: str, function, *arguments):
-        """Measure one run unless it is saved, and return it."""
-        if name not in done and time.process_time() - begin < seconds:
-            clock = time.process_time()
-            found = function(*arguments)
-            done[name] = found | {"seconds": round(time.process_time() - clock, 1)}
-            RESULTS.write_text(json.dumps(done, indent=1) + "\n", encoding="utf-8")
-            print(name, done[name], flush=True)
-        return done.get(name)
-
-    for case in range(len(CASES)):
-        save(f"turn {case}", measure_turn, case)
-    for cells, case in itertools.product(CELLS, range(len(CASES))):
-        for adhesive in (0, 1):
-            save(f"light {case} {cells} {adhesive}", measure_light, case, cells, adhesive)
-    loops = [*itertools.product(CELLS, range(len(CASES))), *itertools.product([_FINEST], _ON_FINEST)]
-    for cells, case in loops:
-        if turn := done.get(f"turn {case}"):
-            save(f"loop {case} {cells}", measure_loop, case, cells, turn["separation"])
+PARTS: Parts = {
+    "turn": (measure_turn, [(case,) for case in range(len(CASES))]),
+    "light": (measure_light, [*product(range(len(CASES)), CELLS, (False, True))]),
+    "loop": (measure_loop, [*product(range(len(CASES)), CELLS), *product(_ON_FINEST, [_FINEST])]),
+}
 
 
 # --- laws and tables ----------------------------------------------------------------------------------------------
 
-# Quantities of a loop in the saved runs, by variable of a run.
+# Quantities of a loop in the saved rows, by variable of a run.
 _NAMES = {"pull_off_pressure": "pull_off", "hysteresis_loss": "loss"}
 # Cells in the length l on the finest grid of a case in the fit, so that the error of this grid is small.
 _FINEST_FROM = 5.0
@@ -157,101 +136,86 @@ _FINEST_FROM = 5.0
 _LOSS_ERROR = 1e-3
 
 
-def loops_of(runs: dict[str, dict], least: float = 0.0) -> dict[int, dict[int, dict]]:
-    """Return the saved loops by case and cells per shortest wave, without loops that failed a check.
+def loops_of(rows: Rows, least: float = 0.0) -> pd.DataFrame:
+    """Return the loops with at least `least` cells in the length l that passed their checks, two or more of each case.
 
-    `least` is the smallest number of cells in the length l. Cases have at least two loops.
+    Further columns: the length on the finest grid of the case, and errors relative to this grid (0 on this grid).
     """
-    found: dict[int, dict[int, dict]] = {}
-    for name, run in runs.items():
-        kind, case, *cells = name.split()
-        if kind == "loop" and not run["failed"] and run["length"] >= least:
-            found.setdefault(int(case), {})[int(cells[0])] = run
-    return {case: by_cells for case, by_cells in found.items() if len(by_cells) > 1}
+    loops = pd.DataFrame(rows["loop"]).sort_values(["case", "cells"])
+    loops = loops[(loops["failed"] == "") & (loops["length"] >= least)]
+    cases = loops.groupby("case")
+    loops = loops[cases["cells"].transform("size") > 1]
+    finest = {name: cases[name].transform("last") for name in ("length", *_NAMES.values())}
+    errors = {f"{name}_error": loops[name] / finest[name] - 1 for name in _NAMES.values()}
+    return loops.assign(finest_length=finest["length"], is_finest=loops["length"] == finest["length"], **errors)
 
 
-def _is_loss_known(runs, case):
-    """Return whether the loss of a case on its finest grid is larger than its numerical error."""
-    by_cells = loops_of(runs)[case]
-    return by_cells[max(by_cells)]["loss"] > _LOSS_ERROR * runs[f"turn {case}"]["work"]
+def _in_fit(rows, least=0.0):
+    """Return the loops to which the laws are fitted."""
+    loops = loops_of(rows, least)
+    return loops[~loops["is_finest"] & (loops["finest_length"] >= _FINEST_FROM)]
 
 
-def fit_loops(runs: dict[str, dict], variable: str) -> LoopError:
+def fit_loops(rows: Rows, variable: str) -> LoopError:
     """Fit the law of a quantity by least squares of ratios: each loop over the loop on the finest grid of its case."""
-    rows = []
-    for by_cells in loops_of(runs, LEAST_MEASURED).values():
-        finest = by_cells.pop(max(by_cells))
-        if finest["length"] >= _FINEST_FROM:
-            values = _NAMES[variable]
-            rows += [(run["length"], finest["length"], run[values] / finest[values]) for run in by_cells.values()]
-    cells, finest_cells, ratios = np.array(rows).T
+    columns = _in_fit(rows, LEAST_MEASURED)[["length", "finest_length", f"{_NAMES[variable]}_error"]]
+    cells, finest_cells, errors = columns.to_numpy().T
 
     def residuals(parameters):
         law = LoopError("", *np.exp(parameters), 0.0)
-        return (1 - law.at(cells)) / (1 - law.at(finest_cells)) - ratios
+        return (1 - law.at(cells)) / (1 - law.at(finest_cells)) - 1 - errors
 
     found = minimize(lambda parameters: np.sum(residuals(parameters) ** 2), [0.0, 0.0], method="Nelder-Mead").x
-    scatter = math.sqrt(np.sum(residuals(found) ** 2) / (len(rows) - len(found)))
+    scatter = math.sqrt(np.sum(residuals(found) ** 2) / (len(cells) - len(found)))
     return LoopError(LOOP_ERRORS[variable].words, *np.exp(found).tolist(), scatter)
 
 
-def areas_of(runs: dict[str, dict]) -> np.ndarray:
-    """Return rows (patches, cells in contact, error of the area) of all light loads, relative to the finest grid."""
-    rows = []
-    for name, run in runs.items():
-        kind, case, *others = name.split()
-        if kind != "light" or int(others[0]) == CELLS[-1]:
-            continue
-        finest = runs.get(f"light {case} {CELLS[-1]} {others[1]}")
-        nodes = (CASES[int(case)].waves * int(others[0])) ** 2
-        for patches, area, exact in zip(run["patches"], run["area"], finest["area"] if finest else [], strict=False):
-            rows.append((patches, area * nodes, area / exact - 1))
-    return np.array(rows)
+def areas_of(rows: Rows) -> pd.DataFrame:
+    """Return patches, cells in contact and error of the area of all light loads, relative to the finest grid."""
+    light = pd.DataFrame(rows["light"])
+    finest = light[light["cells"] == CELLS[-1]].drop(columns=["cells", "patches"])
+    light = light[light["cells"] < CELLS[-1]].merge(finest, on=["case", "adhesive", "load"], suffixes=("", "_finest"))
+    nodes = light["case"].map(lambda case: CASES[case].waves) * light["cells"]
+    error = light["area"] / light["area_finest"] - 1
+    return pd.DataFrame({"patches": light["patches"], "contact_cells": light["area"] * nodes**2, "error": error})
 
 
-def fit_areas(rows: np.ndarray) -> AreaError:
+def fit_areas(areas: pd.DataFrame) -> AreaError:
     """Fit the standard deviation of the error of areas by the largest likelihood of normal errors."""
-    _, cells, error = rows.T
 
     def unlikely(parameters):
-        deviation = (math.exp(parameters[0]) / cells) ** math.exp(parameters[1])
-        return np.sum(np.log(deviation) + (error / deviation) ** 2 / 2)
+        deviation = (math.exp(parameters[0]) / areas["contact_cells"]) ** math.exp(parameters[1])
+        return np.sum(np.log(deviation) + (areas["error"] / deviation) ** 2 / 2)
 
     return AreaError(*np.exp(minimize(unlikely, [0.0, 0.0], method="Nelder-Mead").x).tolist())
 
 
-def _loops(runs):
+def _loops(rows):
     """Table of all loops: pull-off and loss relative to the finest grid of each case."""
-    rows = []
-    for case, by_cells in loops_of(runs).items():
-        surface, finest = CASES[case], by_cells[max(by_cells)]
-        for cells, run in by_cells.items():
-            errors = [percent(run[name] / finest[name] - 1, 0) for name in _NAMES.values()]
-            if not _is_loss_known(runs, case):
-                errors[1] = "not known"
-            numbers = [f"{surface.hurst:g}", f"{surface.waves}, {surface.rolls}", f"{surface.ratio:g}"]
-            rows.append([*numbers, str(cells), f"{run['length']:.2f}", *(errors if run is not finest else ["", ""])])
+    loops, lines = loops_of(rows), []
+    work = {row["case"]: row["work"] for row in rows["turn"]}
+    known = {run.case: run.loss > _LOSS_ERROR * work[run.case] for run in loops[loops["is_finest"]].itertuples()}
+    for run in loops.itertuples():
+        case, loss = CASES[run.case], percent(run.loss_error, 0) if known[run.case] else "not known"
+        errors = ["", ""] if run.is_finest else [percent(run.pull_off_error, 0), loss]
+        numbers = [f"{case.hurst:g}", f"{case.waves}, {case.rolls}", f"{case.ratio:g}"]
+        lines.append([*numbers, str(run.cells), f"{run.length:.2f}", *errors])
     head = ["H", "shortest waves, roll-off waves", "U_full/Δγ", "cells per shortest wave", "cells in l", "pull-off, %"]
-    return Table([*head, "loss, %"], rows, numbers=True)
+    return Table([*head, "loss, %"], lines, numbers=True)
 
 
-def _law(runs):
+def _law(rows):
     """Table of the error of pull-off and loss by cells in the length l, for cases in the fit, with the laws."""
-    laws = {variable: fit_loops(runs, variable) for variable in _NAMES}
-    rows = []
-    for low, high in itertools.pairwise(_CLASSES):
-        errors = {name: [] for name in _NAMES.values()}
-        for by_cells in loops_of(runs).values():
-            finest = by_cells.pop(max(by_cells))
-            for run in by_cells.values() if finest["length"] >= _FINEST_FROM else ():
-                for name in errors if low <= run["length"] < high else ():
-                    errors[name].append(run[name] / finest[name] - 1)
-        cells = [f"{low:g} to {high:g}", str(len(errors["loss"]))]
+    laws, loops, lines = {variable: fit_loops(rows, variable) for variable in _NAMES}, _in_fit(rows), []
+    for low, high in pairwise(_CLASSES):
+        members = loops[(loops["length"] >= low) & (loops["length"] < high)]
+        cells = [f"{low:g} to {high:g}", str(len(members))]
         for variable, name in _NAMES.items():
-            ends = [percent(end(errors[name]), 0) for end in (min, max)] if errors[name] else []
+            errors = members[f"{name}_error"]
+            ends = [percent(end, 0) for end in (errors.min(), errors.max())] if len(errors) else []
             cells += [" to ".join(ends), percent(-laws[variable].at(math.sqrt(low * high)), 0)]
-        rows.append(cells)
-    return Table(["cells in l", "loops", "pull-off, %", "law", "loss, %", "law"], rows, numbers=True)
+        lines.append(cells)
+    return Table(["cells in l", "loops", "pull-off, %", "law", "loss, %", "law"], lines, numbers=True)
 
 
 # Classes of cells in the length l, of cells in contact, and of numbers of patches.
@@ -259,14 +223,16 @@ _CLASSES = (0.6, 1.0, 1.4, 2.0, 2.8, 4.0, 6.0)
 _CONTACT_CELLS, _PATCHES = (0, 32, 64, 128, 256, 512, 10**9), (1, 3, 13, 10**9)
 
 
-def _areas(runs):
+def _areas(rows):
     """Table of the error of areas by cells in contact and number of patches."""
-    rows, law, lines = areas_of(runs), fit_areas(areas_of(runs)), []
-    for (low, high), (few, many) in itertools.product(*map(itertools.pairwise, (_CONTACT_CELLS, _PATCHES))):
-        members = rows[(rows[:, 1] >= low) & (rows[:, 1] < high) & (rows[:, 0] >= few) & (rows[:, 0] < many)]
+    areas, lines = areas_of(rows), []
+    law = fit_areas(areas)
+    for (low, high), (few, many) in product(*map(pairwise, (_CONTACT_CELLS, _PATCHES))):
+        cells, patches = areas["contact_cells"], areas["patches"]
+        members = areas[(cells >= low) & (cells < high) & (patches >= few) & (patches < many)]
         if not len(members):
             continue
-        patches, cells, error = members.T
+        patches, cells, error = (members[name] for name in ("patches", "contact_cells", "error"))
         contact = f"{low} to {high}" if high < 10**9 else f"over {low}"
         count = f"{few} to {many - 1}" if many < 10**9 else f"over {few - 1}"
         numbers = [f"{np.mean(cells / patches):.0f}", str(len(members)), percent(error.mean(), 1)]
@@ -277,25 +243,15 @@ def _areas(runs):
     return Table(head, lines, numbers=True)
 
 
-def tables(runs: dict[str, dict]) -> dict[str, Table]:
-    """Return all tables from the saved runs."""
-    return {"loop_grid_loops": _loops(runs), "loop_grid_law": _law(runs), "loop_grid_areas": _areas(runs)}
+def tables(rows: Rows) -> dict[str, Table]:
+    """Return all tables from the saved rows."""
+    return {"loop_grid_loops": _loops(rows), "loop_grid_law": _law(rows), "loop_grid_areas": _areas(rows)}
 
 
-def main() -> None:
-    """Measure, save, and write the tables."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--minutes", type=float, default=40.0, help="largest computing time of this call")
-    parser.add_argument("--tables", action="store_true", help="write the tables from saved measurements")
-    options = parser.parse_args()
-    warnings.simplefilter("ignore")
-    if not options.tables:
-        measure(60 * options.minutes)
-    runs = read_measurements()
-    write_tables(tables(runs))
-    for law in (*(fit_loops(runs, variable) for variable in _NAMES), fit_areas(areas_of(runs))):
-        print(law)
-
+read_measurements = partial(read_rows, "loop_grid", PARTS)
 
 if __name__ == "__main__":
-    main()
+    measure_page("loop_grid", PARTS, tables, __doc__)
+    print(
+        *(fit_loops(read_measurements(), name) for name in _NAMES), fit_areas(areas_of(read_measurements())), sep="\n"
+    )

@@ -6,6 +6,7 @@ Run the campaign first; then: python -m validation.model_error
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from itertools import compress, product
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,12 @@ from icha.contact.models import MODELS
 from icha.datasets.campaign import run_labels, select_run
 from icha.datasets.files import read_campaign
 from validation.tables import Table, copy_figures, means, pressures, write_tables
+
+_DISTANCES = {
+    "pressure_distribution_distance": "P(p)",
+    "gap_distribution_distance": "P(u)",
+    "jaccard": "maps in common",
+}
 
 
 def select_adhesion(errors: xr.Dataset, adhesive: bool) -> xr.Dataset:
@@ -47,46 +54,26 @@ def summary(entries: Mapping[str, xr.Dataset]) -> Table:
 
 def _lines(errors: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
     """Yield a label and the errors of every surface, slope and material of a study."""
-    for surface in errors["surface"].values:
-        for slope in errors["rms_slope"].values:
-            for material in errors["material"].values:
-                own = errors.sel(surface=surface, rms_slope=slope, material=material)
-                words = [f"`{surface}`"]
-                if errors.sizes["rms_slope"] > 1:
-                    words.append(f"slope {slope:g}")
-                if errors.sizes["material"] > 1:
-                    words.append(f"`{material}`")
-                yield ", ".join(words), own
+    for surface, slope, material in product(*(errors[name].values for name in ("surface", "rms_slope", "material"))):
+        words = [f"`{surface}`", f"slope {slope:g}", f"`{material}`"]
+        many = True, errors.sizes["rms_slope"] > 1, errors.sizes["material"] > 1
+        yield ", ".join(compress(words, many)), errors.sel(surface=surface, rms_slope=slope, material=material)
 
 
-def errors_by_load(errors: xr.Dataset, name: str) -> Table:
-    """Table of an error of one study in per cent, a row for each surface and a column for each load."""
-    rows = [
-        [words, *means(100 * own[name].transpose("seed", "reduced_pressure").values, "{:+.1f}")]
-        for words, own in _lines(errors)
-    ]
-    return Table(["surface", *pressures(errors["reduced_pressure"].values)], rows)
+def by_load(short_range: xr.Dataset, quantities: Mapping[str, str], form: str, unit: float = 1.0) -> Table:
+    """Table of means over the seeds without and with adhesion: a row for each surface and quantity, a column per load.
 
-
-def distances(errors: xr.Dataset) -> Table:
-    """Table of the distances of the distributions P(p) and P(u) and the overlap of the contact maps."""
-    quantities = {
-        "pressure_distribution_distance": "P(p)",
-        "gap_distribution_distance": "P(u)",
-        "jaccard": "maps in common",
-    }
-    rows = []
-    for words, own in _lines(errors):
-        for name, what in quantities.items():
-            rows.append([words, what, *means(own[name].transpose("seed", "reduced_pressure").values, "{:.3f}")])
-            words = ""
-    return Table(["surface", "", *pressures(errors["reduced_pressure"].values)], rows)
-
-
-def both(bare: Table, adhesive: Table) -> Table:
-    """Join the tables without and with adhesion, which have the same columns."""
-    rows = [[name, *row] for name, table in (("without", bare), ("with", adhesive)) for row in table.rows]
-    return Table(["adhesion", *bare.head], rows)
+    `quantities` are words by name; without words, the table has no column for them.
+    """
+    several, rows = any(quantities.values()), []
+    for adhesion in (False, True):
+        for words, own in _lines(select_adhesion(short_range, adhesion)):
+            for k, (name, what) in enumerate(quantities.items()):
+                first = ["with" if adhesion else "without", "" if k else words, *([what] if several else [])]
+                values = unit * own[name].transpose("seed", "reduced_pressure").values
+                rows.append([*first, *means(values, form)])
+    head = ["adhesion", "surface", *([""] if several else [])]
+    return Table([*head, *pressures(short_range["reduced_pressure"].values)], rows)
 
 
 def range_and_limit(short_range: xr.Dataset, finite_range: xr.Dataset) -> Table:
@@ -167,9 +154,9 @@ def tables(entries: Mapping[str, xr.Dataset], campaign: xr.DataTree) -> dict[str
     }
     found = {
         "summary": summary(covered),
-        "area": both(errors_by_load(bare, "area_error"), errors_by_load(adhesive, "area_error")),
-        "separation": both(errors_by_load(bare, "separation_error"), errors_by_load(adhesive, "separation_error")),
-        "distributions": both(distances(bare), distances(adhesive)),
+        "area": by_load(entries["short_range"], {"area_error": ""}, "{:+.1f}", 100),
+        "separation": by_load(entries["short_range"], {"separation_error": ""}, "{:+.1f}", 100),
+        "distributions": by_load(entries["short_range"], _DISTANCES, "{:.3f}"),
         "range_and_limit": range_and_limit(adhesive, entries["finite_range"]),
         "ranges": effect_of_range(entries["ranges"]),
         "both_ways": loops_of_both_models(campaign, "small"),

@@ -20,8 +20,8 @@ import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+import pandas as pd
 import scipy.fft
-import xarray as xr
 
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
@@ -59,95 +59,66 @@ def resolving_grid(material: Material, period: float) -> int:
 
 
 def one_asperity(
-    tabor_parameter: float,
-    *,
-    approaches: Sequence[float] = (3.0, 2.0, 1.0),
-    period: float = 12.0,
-    to_pull_off: bool = True,
-) -> xr.Dataset:
-    """Load an adhesive asperity and unload it, with the model and with boundary elements.
-
-    Parameters
-    ----------
-    tabor_parameter : positive.
-    approaches : m, that is (dgamma^2 R/E*^2)^(1/3), falling.
-    period : of the cell, m.
-    to_pull_off : whether the approach at the pull-off force of the model is added.
-
-    Returns
-    -------
-    xarray.Dataset: along `approach` both sides at the same approach; along `given_load` the model at the forces of the
-    boundary elements at the given approaches, if the model can carry them.
-    """
+    tabor_parameter: float, approaches: Sequence[float] = (3.0, 2.0, 1.0), period: float = 12.0
+) -> pd.DataFrame:
+    """Unload an adhesive asperity from approaches (m, falling) to the pull-off of the model; rows of `compare`."""
     material = Material(1.0, 1.0, 1 / tabor_parameter)
     surface = paraboloid(resolving_grid(material, period), period)
-    all_approaches = (*approaches, *([pull_off_approach(JKR(material), period)] if to_pull_off else []))
-    gaps = (surface.heights.max() - approach for approach in all_approaches)
-    states = contacts_at_gaps(surface, material, gaps, _TOLERANCE)
-    return _comparison(surface, material, states, len(approaches))
+    # The largest tension of the model, with dF/da = 0, at the approach of the asperity with its images.
+    a, summit = np.cbrt(9 * np.pi / 8 * material.adhesion_length), np.zeros((1, 2))
+    pull_off = float(displacement_at(JKR(material), period, summit, summit, np.array([a]), np.ones(1))[0])
+    gaps = [surface.heights.max() - approach for approach in (*approaches, pull_off)]
+    return compare(surface, material, contacts_at_gaps(surface, material, gaps, _TOLERANCE))
 
 
-def hertz_asperity() -> xr.Dataset:
-    """Compare without adhesion, at the loads of the contact radii 1 m and 0.5 m by Hertz's law."""
+def hertz_asperity() -> pd.DataFrame:
+    """Press an asperity without adhesion at the loads of the contact radii 1 m and 0.5 m by Hertz's law."""
     material = Material(1.0, 0.0, 1.0)
     surface = paraboloid(512, 16.0)
     pressures = [float(JKR(material).force(radius, 1.0)) / surface.period**2 for radius in (1.0, 0.5)]
-    states = (contact_at_load(surface, material, pressure, _TOLERANCE) for pressure in pressures)
-    return _comparison(surface, material, states, len(pressures))
+    states = [contact_at_load(surface, material, pressure, _TOLERANCE) for pressure in pressures]
+    return compare(surface, material, states)
 
 
-def pull_off_approach(law: JKR, period: float) -> float:
-    """Return the approach of the asperity with its images at the largest tension, m.
+def compare(surface: Surface, material: Material, states: Iterable[OracleState]) -> pd.DataFrame:
+    """Compare the model with states of boundary elements, at the same approach and at the same load: a row for each.
 
-    The radius is (9 pi dgamma R^2/(8 E*))^(1/3), where dF/da = 0.
+    Errors at the same load are NaN from the pull-off force of the model on.
     """
-    summit, R = np.zeros((1, 2)), np.ones(1)
-    a = np.cbrt(9 * np.pi / 8 * law.material.adhesion_length * R**2)
-    return float(displacement_at(law, period, summit, summit, a, R)[0])
-
-
-def _comparison(surface: Surface, material: Material, states: Iterable[OracleState], loaded: int) -> xr.Dataset:
-    """Compare at the approaches of the boundary elements' states, and at the loads of the first `loaded` of them."""
-    pull_off = _PULL_OFF * material.surface_energy
-    nominal, top = surface.period**2, float(surface.heights.max())
+    pull_off, nominal, top = _PULL_OFF * material.surface_energy, surface.period**2, float(surface.heights.max())
     contact = InteractingAsperities(JKR(material), find_summits(surface), surface.rms_height)
-    model = contact.untouched()
-    rows, at_load = [], []
-    for index, state in enumerate(states):
-        separation = float(state.gap.mean())
-        approach, force = top - separation, float(state.traction.mean()) * nominal
+    model, rows = contact.untouched(), []
+    for state in states:
+        separation, force = float(state.gap.mean()), float(state.traction.mean()) * nominal
         zero_gap = state.area_fraction * nominal
         energetic = float(np.mean(np.exp(-state.gap / material.interaction_range))) * nominal
         model = contact.equilibrium(model, separation)
-        rows.append((approach, force, zero_gap, energetic, *force_and_area(contact, model)))
-        if index < loaded and force > -pull_off:
-            at_given_load = contact.equilibrium(model, model.separation, Control(PRESSURE, force / nominal))
-            at_load.append((index, force_and_area(contact, at_given_load)[1], top - at_given_load.separation))
-    approach, force, zero_gap, energetic, force_icha, area_icha = np.array(rows).T
-    at = [index for index, *_ in at_load]
-    area_at_load, approach_at_load = np.array([solved for _, *solved in at_load]).reshape(-1, 2).T
-    length = np.cbrt(material.adhesion_length**2) if pull_off else approach[at]
-    along, by_load = ("approach",), ("given_load",)
-    values = {
-        "force_boundary_elements": (along, force),
-        "zero_gap_area": (along, zero_gap),
-        "energetic_area": (along, energetic),
-        "force_icha": (along, force_icha),
-        "area_icha": (along, area_icha),
-        "area_icha_at_load": (by_load, area_at_load),
-        "force_error": (along, (force_icha - force) / np.maximum(np.abs(force), pull_off)),
-        "zero_gap_area_error": (along, area_icha / zero_gap - 1),
-        "energetic_area_error": (along, area_icha / energetic - 1),
-        "zero_gap_area_error_at_load": (by_load, area_at_load / zero_gap[at] - 1),
-        "energetic_area_error_at_load": (by_load, area_at_load / energetic[at] - 1),
-        "approach_error_at_load": (by_load, (approach_at_load - approach[at]) / length),
-        "tabor_parameter": float(material.tabor_parameter(1.0)),
-        "grid": surface.grid,
-        "strength_number": strength_number(material, surface.spacing),
-    }
-    if pull_off:
-        values["pull_off_error"] = (pull_off - float(np.max(-force))) / pull_off
-    return xr.Dataset(values, {"approach": approach, "given_load": force[at]})
+        own_force, area = force_and_area(contact, model)
+        area_at_load = own_approach = math.nan
+        if force > -pull_off:
+            at_load = contact.equilibrium(model, model.separation, Control(PRESSURE, force / nominal))
+            area_at_load, own_approach = force_and_area(contact, at_load)[1], top - at_load.separation
+        approach = top - separation
+        rows.append(
+            {
+                "force": force,
+                "zero_gap_area": zero_gap,
+                "energetic_area": energetic,
+                "area_icha": area,
+                "area_icha_at_load": area_at_load,
+                "force_error": (own_force - force) / max(abs(force), pull_off),
+                "zero_gap_area_error": area / zero_gap - 1,
+                "energetic_area_error": area / energetic - 1,
+                "zero_gap_area_error_at_load": area_at_load / zero_gap - 1,
+                "energetic_area_error_at_load": area_at_load / energetic - 1,
+                "approach_error_at_load": (own_approach - approach) / (1.0 if pull_off else approach),
+                "pull_off_error": 1 + force / pull_off if pull_off else math.nan,
+                "tabor_parameter": float(material.tabor_parameter(1.0)),
+                "grid": surface.grid,
+                "strength_number": strength_number(material, surface.spacing),
+            }
+        )
+    return pd.DataFrame(rows)
 
 
 # --- tables -------------------------------------------------------------------------------------------------------
@@ -159,40 +130,37 @@ _ERRORS = {
     "energetic_area_error_at_load": "area over energetic, same load",
     "force_error": "force, same approach",
     "approach_error_at_load": "approach, same load",
-    "pull_off_error": "pull-off force",
+}
+_BARE = {
+    "zero_gap_area_error_at_load": "area, same load",
+    "zero_gap_area_error": "area, same approach",
+    "approach_error_at_load": "approach, same load",
+    "force_error": "force, same approach",
 }
 
 
 def _range(error, digits):
-    """Return the range of an error in per cent, one number if both ends are equal as printed, a dash if empty."""
-    if not error.size:
-        return "–"
+    """Return the range of an error in per cent, one number if both ends are equal as printed."""
     return " to ".join(dict.fromkeys(percent(float(end), digits) for end in (error.min(), error.max())))
 
 
-def tables(adhesive: Sequence[xr.Dataset], hertz: xr.Dataset) -> dict[str, Table]:
+def tables(adhesive: Sequence[pd.DataFrame], hertz: pd.DataFrame) -> dict[str, Table]:
     """Return the tables of errors with adhesion, a row for each Tabor parameter, and without."""
-    rows = [
-        [
-            f"{float(one['tabor_parameter']):g}",
-            str(int(one["grid"])),
-            f"{float(one['strength_number']):.3f}",
-            *(_range(one[name], 1) for name in _ERRORS),
-        ]
-        for one in adhesive
+    rows = []
+    for one in adhesive:
+        mu, grid, number = one[["tabor_parameter", "grid", "strength_number"]].iloc[0]
+        # The largest tension is that of the state at the pull-off of the model.
+        errors = [_range(one[name], 1) for name in _ERRORS] + [percent(one["pull_off_error"].min(), 1)]
+        rows.append([f"{mu:g}", f"{grid:.0f}", f"{number:.3f}", *errors])
+    radii = np.sqrt(hertz["area_icha_at_load"] / np.pi)
+    row = [
+        f"{radii.min():.2g} to {radii.max():.2g} R",
+        f"{hertz['grid'][0]}",
+        *(_range(hertz[name], 2) for name in _BARE),
     ]
-    radii = np.sqrt(hertz["area_icha_at_load"].values / np.pi)
-    bare = {
-        "area, same load": "zero_gap_area_error_at_load",
-        "area, same approach": "zero_gap_area_error",
-        "approach, same load": "approach_error_at_load",
-        "force, same approach": "force_error",
-    }
-    row = [f"{radii.min():.2g} to {radii.max():.2g} R", str(int(hertz["grid"]))]
-    row += [_range(hertz[name], 2) for name in bare.values()]
     return {
-        "one_asperity": Table(["μ", "n", "strength number", *_ERRORS.values()], rows),
-        "one_asperity_hertz": Table(["contact radius", "n", *bare], [row]),
+        "one_asperity": Table(["μ", "n", "strength number", *_ERRORS.values(), "pull-off force"], rows),
+        "one_asperity_hertz": Table(["contact radius", "n", *_BARE.values()], [row]),
     }
 
 

@@ -127,6 +127,7 @@ def loop(surface: Surface, largest_pressure: float, step: float, material: Mater
     losses = {name: getattr(balance, name) for name in names}
     return {
         "grid": surface.grid,
+        "adhesion": material.surface_energy > 0,
         "step": step,
         "steps": steps,
         "largest_work": largest_work / unit,

@@ -8,82 +8,61 @@ validation/results/short_range, and the tables are written from them; with `--ta
 
 from __future__ import annotations
 
-import argparse
-import itertools
-import json
 import math
-import time
-from collections.abc import Callable, Iterable
-from pathlib import Path
+from functools import partial
+from itertools import product
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from validation import rough_contacts as rough
 from validation import single_contacts as single
+from validation.measurements import Parts, Rows, measure_page, read_rows
 from validation.rough_contacts import HARD, SOFT
-from validation.tables import Table, by, percent, write_tables
+from validation.tables import Table, by, by_radius, percent, worst
 
-RESULTS = Path(__file__).resolve().parent / "results/short_range"
 _OFFSETS = tuple(single.offsets(5))
+_ROUGH = rough.rough(128)
+# Reduced pressures of the comparison with Tamaas.
+_LOADS = (1e-3, 1e-2, 5e-2, 0.146, 0.35, 0.73, 1.0)
 # Ranges (m), and refinements of the grid that resolve them, for dgamma/E* = 20 nm and waves from 6.25 um on.
 _RANGES = ((400e-9, 1), (283e-9, 2), (200e-9, 2), (141e-9, 4), (100e-9, 8))
 
 
-def _all(solve: Callable, *lists: Iterable):
-    """Yield the rows of all combinations of the arguments."""
-    for arguments in itertools.product(*lists):
-        rows = solve(*arguments)
-        yield from [rows] if isinstance(rows, dict) else rows
-
-
-def _loops():
-    for material, step in itertools.product((HARD, SOFT), (0.2, 0.1)):
-        yield rough.loop(rough.rough(128), 1e-2, step, material) | {"adhesion": material is SOFT}
-
-
-def _tamaas(grid, seed):
-    return rough.without_adhesion(rough.rough(grid, grid // 8, seed=seed), (1e-3, 1e-2, 5e-2, 0.146, 0.35, 0.73, 1.0))
-
-
-def _punch(square, grid_and_cells):
-    return single.flat_punch(*grid_and_cells, square)
-
-
-PARTS: dict[str, Callable] = {
-    "sphere": lambda: _all(single.sphere_loop, (40, 64, 100, 140), _OFFSETS),
-    "load": lambda: _all(single.sphere_under_load, (40, 64, 100), _OFFSETS[:3]),
-    "pull_off": lambda: _all(single.sphere_pull_off, (40, 64, 100), _OFFSETS[:3]),
-    "jump_in": lambda: _all(single.sphere_jump_in, (40, 64, 100), (0.2, 0.5)),
-    "ellipse": lambda: _all(single.ellipse, (48, 64, 100, 160), (0.0, 20.0, 45.0)),
-    "punches": lambda: _all(_punch, (False, True), ((64, 8), (96, 12), (128, 16))),
-    "strips": lambda: _all(single.row_of_strips, (64, 96), (0.2,)),
-    "sinusoid": lambda: _all(single.sinusoid, (32, 64, 128), (0.1, 0.3)),
-    "crack": lambda: _all(single.crack, (48, 64, 96, 128)),
-    "pair": lambda: _all(single.pair, (96, 128)),
-    "tamaas": lambda: _all(_tamaas, (128, 256), (1, 2)),
-    "ranges": lambda: rough.towards_short_range(rough.rough(128, 8, 16), (2.0, 1.5), _RANGES, 0.5),
-    "loops": _loops,
-    "cells": lambda: rough.by_cells_per_wave(16, (4, 8, 16, 32), (2.4, 2.0, 1.6)),
-    "symmetry": lambda: rough.symmetries(rough.rough(128), 2.0),
-    "steps": lambda: rough.by_steps(rough.rough(128), 1.8, (5, 50)),
+PARTS: Parts = {
+    "sphere": (single.sphere_loop, [*product((40, 64, 100, 140), _OFFSETS)]),
+    "load": (single.sphere_under_load, [*product((40, 64, 100), _OFFSETS[:3])]),
+    "pull_off": (single.sphere_pull_off, [*product((40, 64, 100), _OFFSETS[:3])]),
+    "jump_in": (single.sphere_jump_in, [*product((40, 64, 100), (0.2, 0.5))]),
+    "ellipse": (single.ellipse, [*product((48, 64, 100, 160), (0.0, 20.0, 45.0))]),
+    "punches": (
+        single.flat_punch,
+        [(*size, square) for square in (False, True) for size in ((64, 8), (96, 12), (128, 16))],
+    ),
+    "strips": (single.row_of_strips, [(64, 0.2), (96, 0.2)]),
+    "sinusoid": (single.sinusoid, [*product((32, 64, 128), (0.1, 0.3))]),
+    "crack": (single.crack, [(48,), (64,), (96,), (128,)]),
+    "pair": (single.pair, [(96,), (128,)]),
+    "tamaas": (
+        rough.without_adhesion,
+        [(rough.rough(grid, grid // 8, seed=seed), _LOADS) for grid, seed in product((128, 256), (1, 2))],
+    ),
+    "ranges": (rough.towards_short_range, [(rough.rough(128, 8, 16), (2.0, 1.5), _RANGES, 0.5)]),
+    "loops": (rough.loop, [(_ROUGH, 1e-2, step, material) for material, step in product((HARD, SOFT), (0.2, 0.1))]),
+    "cells": (rough.by_cells_per_wave, [(16, (4, 8, 16, 32), (2.4, 2.0, 1.6))]),
+    "symmetry": (rough.symmetries, [(_ROUGH, 2.0)]),
+    "steps": (rough.by_steps, [(_ROUGH, 1.8, (5, 50))]),
 }
 
 
 # --- errors -------------------------------------------------------------------------------------------------------
 
 
-def _worst(rows: Iterable[dict], *names: str) -> float:
-    """Return the largest error of these names."""
-    return max(abs(row[name]) for row in rows for name in names)
-
-
-def _within(rows: Iterable[dict], low: float, high: float) -> list[dict]:
+def _within(rows: list[dict], low: float, high: float) -> list[dict]:
     """Return the rows with a contact radius from `low` to less than `high` cells."""
     return [row for row in rows if low <= row["cells"] < high]
 
 
-def bounds(rows: dict[str, list[dict]]) -> Table:
+def bounds(rows: Rows) -> Table:
     """Table of all targets with the measured errors."""
     lines = []
 
@@ -110,38 +89,23 @@ def bounds(rows: dict[str, list[dict]]) -> Table:
                 share = sum(abs(row[name]) <= bound for row in rows_at_place) / len(rows_at_place)
                 add(
                     f"sphere of {cells}, centre {place}: {what}",
-                    _worst(rows_at_place, name),
+                    worst(rows_at_place, name),
                     bound,
                     f"{100 * share:.0f} %",
                 )
     add("turned elliptic paraboloids, short axis of 8 cells and more", _turned_error(rows["ellipse"]), 0.01)
-    add("without adhesion, mean gap against Tamaas", _worst(rows["tamaas"], "separation_error"), 1e-4)
-    add("without adhesion, gap everywhere (rms, over h_rms)", _worst(rows["tamaas"], "gap_error"), 1e-3)
-    add("without adhesion, area against Tamaas", _worst(rows["tamaas"], "area_error"), 1e-4)
+    add("without adhesion, mean gap against Tamaas", worst(rows["tamaas"], "separation_error"), 1e-4)
+    add("without adhesion, gap everywhere (rms, over h_rms)", worst(rows["tamaas"], "gap_error"), 1e-3)
+    add("without adhesion, area against Tamaas", worst(rows["tamaas"], "area_error"), 1e-4)
     hard, soft = ([row for row in rows["loops"] if row["adhesion"] == adhesion] for adhesion in (False, True))
     lost = max(abs(row["work"]) / row["largest_work"] for row in hard)
     add("closed loop without adhesion, work over the most work", lost, 1e-4)
     coarse, fine = soft
     add("closed loop with adhesion, work at half the step", abs(coarse["work"] / fine["work"] - 1), 0.01)
     errors = ("pressure_error", "area_error")
-    add("shifted, reflected, turned by 90°: load and area", _worst(rows["symmetry"], *errors), 1e-4)
-    add("5 against 50 steps to one stop: load and area", _worst(rows["steps"], *errors), 1e-4)
+    add("shifted, reflected, turned by 90°: load and area", worst(rows["symmetry"], *errors), 1e-4)
+    add("5 against 50 steps to one stop: load and area", worst(rows["steps"], *errors), 1e-4)
     return Table(["what", "largest error", "states within the target", "target", ""], lines)
-
-
-def by_radius(rows: list[dict], names: dict[str, str]) -> Table:
-    """Table of the mean and range of errors in classes of the contact radius."""
-
-    def spread(members, name):
-        values = np.array([row[name] for row in members])
-        return f"{percent(values.mean())} ({percent(values.min())} to {percent(values.max())})"
-
-    lines = []
-    for low, high in ((4, 8), (8, 12), (12, 20), (20, math.inf)):
-        if members := _within(rows, low, high):
-            label = f"{low} to {high}" if math.isfinite(high) else f"over {low}"
-            lines.append([label, str(len(members)), *(spread(members, name) for name in names)])
-    return Table(["cells in the radius", "states", *names.values()], lines)
 
 
 def convergence(rows: list[dict]) -> Table:
@@ -232,7 +196,7 @@ _LOOP |= {"jump_off": ("jumps off", ".2e"), "coalescence": ("merging and splitti
 _LOOP |= {"unattributed": ("no event", ".2e"), "not_closed": ("imbalance", ".2e")}
 _GRID = {"grid": ("grid", "g")}
 _ERRORS = {"area_error": ("area", "%"), "force_error": ("force", "%")}
-_CELLS = "cells in the radius"
+_CELLS, _EDGES = "cells in the radius", (4, 8, 12, 20)
 
 # Tables with a line for every row of a part: the part, and its columns.
 _BY_ROW = {
@@ -264,17 +228,17 @@ _BY_ROW = {
 }
 
 
-def tables(rows: dict[str, list[dict]]) -> dict[str, Table]:
+def tables(rows: Rows) -> dict[str, Table]:
     """Return all tables of the page from the rows of all parts."""
     for row in rows["loops"]:
         row["with"] = "with" if row["adhesion"] else "without"
     in_fewer_steps = [row | {"what": f"in {row['steps']} instead of 50 steps"} for row in rows["steps"][1:]]
     found = {
         "bounds": bounds(rows),
-        "sphere": by_radius(rows["sphere"], {"area_error": "area", "force_error": "force"}),
+        "sphere": by_radius(rows["sphere"], {"area_error": "area", "force_error": "force"}, _EDGES),
         "convergence": convergence(rows["sphere"]),
-        "load": by_radius(rows["load"], {"area_error": "area", "approach_error": "approach"}),
-        "pull_off": by_radius(rows["pull_off"], {"pull_off_error": "pull-off force"}),
+        "load": by_radius(rows["load"], {"area_error": "area", "approach_error": "approach"}, _EDGES),
+        "pull_off": by_radius(rows["pull_off"], {"pull_off_error": "pull-off force"}, _EDGES),
         "ellipse": turned(rows["ellipse"]),
         "ranges": towards_zero(rows["ranges"]),
         "cells": by_grid(rows["cells"]),
@@ -284,29 +248,7 @@ def tables(rows: dict[str, list[dict]]) -> dict[str, Table]:
     return {f"short_range_{name}": table for name, table in found.items()}
 
 
-def read_measurements() -> dict[str, list[dict]]:
-    """Read the rows of all parts."""
-    return {part: json.loads((RESULTS / f"{part}.json").read_text(encoding="utf-8"))["rows"] for part in PARTS}
-
-
-def main() -> None:
-    """Measure parts, save their numbers, and write the tables."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--parts", nargs="+", choices=PARTS, default=PARTS, metavar="PART", help=", ".join(PARTS))
-    parser.add_argument("--tables", action="store_true", help="write the tables from saved measurements")
-    options = parser.parse_args()
-    for part in () if options.tables else options.parts:
-        print(f"{part} ...", end=" ", flush=True)
-        clock = time.perf_counter()
-        with threadpool_limits(1):
-            rows = list(PARTS[part]())
-        found = {"seconds": round(time.perf_counter() - clock, 1), "rows": rows}
-        (RESULTS / f"{part}.json").write_text(
-            json.dumps(found, indent=1, default=lambda number: number.item()) + "\n", encoding="utf-8"
-        )
-        print(f"{len(rows)} rows in {found['seconds']:.0f} s", flush=True)
-    write_tables(tables(read_measurements()))
-
+read_measurements = partial(read_rows, "short_range", PARTS)
 
 if __name__ == "__main__":
-    main()
+    measure_page("short_range", PARTS, tables, __doc__)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 import re
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -65,6 +67,41 @@ def by(rows: Sequence[Mapping], columns: Mapping[str, tuple[str, str]]) -> Table
 
     lines = dict.fromkeys(tuple(written(row[name], form) for name, (_, form) in columns.items()) for row in rows)
     return Table([heading for heading, _ in columns.values()], [list(line) for line in lines])
+
+
+def worst(rows: Iterable[Mapping], *names: str) -> float:
+    """Return the largest error of these names."""
+    return max(abs(row[name]) for row in rows for name in names if name in row)
+
+
+def by_radius(
+    rows: Sequence[Mapping],
+    names: Mapping[str, str],
+    edges: Sequence[float],
+    places: Mapping[str, Sequence[tuple[float, float]]] = {},
+) -> Table:
+    """Table of the mean and range of errors in classes of the contact radius, and of the place of the apex.
+
+    Parameters
+    ----------
+    names : headings of the errors, by their names.
+    edges : lower ends of the classes, in cells.
+    places : places of the apex by words; empty for a table without places.
+    """
+
+    def spread(members, name):
+        values = np.array([row[name] for row in members])
+        return f"{percent(values.mean())} ({percent(values.min())} to {percent(values.max())})"
+
+    lines = []
+    for (low, high), where in itertools.product(itertools.pairwise((*edges, math.inf)), places or [""]):
+        members = [row for row in rows if low <= row["cells"] < high]
+        members = [row for row in members if not places or tuple(row["place"]) in places[where]]
+        if members:
+            label = f"{low} to {high}" if math.isfinite(high) else f"over {low}"
+            words = [label, where] if places else [label]
+            lines.append([*words, str(len(members)), *(spread(members, name) for name in names)])
+    return Table(["cells in the radius", *(["apex"] if places else []), "states", *names.values()], lines)
 
 
 def pressures(values: np.ndarray) -> list[str]:

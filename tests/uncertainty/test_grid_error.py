@@ -49,10 +49,10 @@ def test_laws_of_loops_are_those_of_the_measurements(variable):
 
 
 def test_law_of_areas_is_that_of_the_measurements():
-    rows = loop_grid.areas_of(loop_grid.read_measurements())
-    assert AREA_ERROR == pytest.approx(loop_grid.fit_areas(rows), rel=0.01)
+    areas = loop_grid.areas_of(loop_grid.read_measurements())
+    assert AREA_ERROR == pytest.approx(loop_grid.fit_areas(areas), rel=0.01)
     # Four of five errors at least are within two standard deviations.
-    assert np.mean(np.abs(rows[:, 2]) < 2 * AREA_ERROR.at(rows[:, 1])) > 0.8
+    assert np.mean(np.abs(areas["error"]) < 2 * AREA_ERROR.at(areas["contact_cells"])) > 0.8
 
 
 def test_length_of_a_summit_in_cells():

@@ -20,8 +20,7 @@ def hertzian():
     "name", ["zero_gap_area_error", "force_error", "zero_gap_area_error_at_load", "approach_error_at_load"]
 )
 def test_hertzian_bump_agrees_within_one_percent(hertzian, name):
-    np.testing.assert_allclose(hertzian[name], 0, atol=0.01)
-    assert hertzian.sizes["given_load"] == 2
+    assert len(hertzian) == 2 and hertzian[name].abs().max() < 0.01
 
 
 @pytest.fixture(scope="module")
@@ -38,24 +37,24 @@ def adhesive():
     "name", ["energetic_area_error", "force_error", "energetic_area_error_at_load", "approach_error_at_load"]
 )
 def test_jkr_bump_agrees(adhesive, name):
-    np.testing.assert_allclose(adhesive[name], 0, atol=0.08)
-    assert adhesive.given_load[0] > 0 > adhesive.given_load[1]
+    assert adhesive[name].abs().max() < 0.08
+    assert adhesive.force[0] > 0 > adhesive.force[1] and adhesive[name].notna().sum() >= 2
 
 
 def test_jkr_pull_off_force_agrees(adhesive):
     """The largest tension agrees with JKR's 3/2 pi dgamma R."""
-    assert max(-adhesive.force_boundary_elements) == pytest.approx(1.5 * np.pi, rel=0.08)
+    assert max(-adhesive.force) == pytest.approx(1.5 * np.pi, rel=0.08)
 
 
 def test_jkr_contact_lies_between_the_zero_gap_and_the_energetic_area(adhesive):
     """In tension, where the effect of the neighbouring cells is small."""
-    tension = adhesive.isel(approach=slice(1, None))
-    assert np.all(tension.force_boundary_elements < 0) and tension.sizes["approach"] == 2
-    assert np.all(tension.zero_gap_area < tension.area_icha)
-    assert np.all(tension.area_icha < tension.energetic_area)
+    tension = adhesive.iloc[1:]
+    assert (tension.force < 0).all() and len(tension) == 2
+    assert (tension.zero_gap_area < tension.area_icha).all()
+    assert (tension.area_icha < tension.energetic_area).all()
 
 
 def test_the_grid_is_the_coarsest_fast_one_that_resolves_the_range(adhesive):
     """The strength number falls as the root of the spacing; numbers of factors 2, 3 and 5 lie close."""
-    assert 0.95 * MAX_STRENGTH_NUMBER < adhesive.strength_number < MAX_STRENGTH_NUMBER
+    assert 0.95 * MAX_STRENGTH_NUMBER < adhesive.strength_number[0] < MAX_STRENGTH_NUMBER
     assert resolving_grid(Material(1.0, 1.0, 1 / 4), 12.0) == 800  # at 768 it is one half
