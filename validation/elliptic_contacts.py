@@ -1,6 +1,8 @@
 """Closed forms of paraboloids with two radii, and of the front of a small wave, in SI units.
 
-Arguments and signs are those of `icha.references.indentation`.
+Arguments and signs are those of `icha.references.indentation`. Adhesive contacts of ellipses: K. L. Johnson and J. A.
+Greenwood, J. Phys. D: Appl. Phys. 38 (2005) 1042, doi:10.1088/0022-3727/38/7/012; A. Giudici, D. Vella and I.
+Griffiths, Mechanics of elliptical JKR-type adhesive contact, arXiv:2407.00378 (2024).
 """
 
 import math
@@ -9,12 +11,6 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
-JOHNSON_GREENWOOD = (
-    "K. L. Johnson and J. A. Greenwood, J. Phys. D: Appl. Phys. 38 (2005) 1042, doi:10.1088/0022-3727/38/7/012"
-)
-GIUDICI = (
-    "A. Giudici, D. Vella and I. Griffiths, Mechanics of elliptical JKR-type adhesive contact, arXiv:2407.00378 (2024)"
-)
 # The midpoint rule over a quarter of an ellipse converges exponentially; the number suffices for axis ratios >= 0.01.
 _QUARTER = (np.arange(2048) + 0.5) * (math.pi / 4096)
 # Smallest ratio of the axes of an elliptic contact.

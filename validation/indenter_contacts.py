@@ -62,10 +62,6 @@ def force_and_radius(contact: BoundaryElements, state) -> tuple[float, float]:
     return force, math.sqrt(area / math.pi)
 
 
-def _radii(shape, place, cells):
-    return {"shape": type(shape).__name__.lower(), "place": list(place), "cells": cells}
-
-
 # --- spheres ------------------------------------------------------------------------------------------------------
 
 
@@ -87,7 +83,8 @@ def hertz(cells: float, place: Sequence[float] = PLACES[0], grid: int = 64) -> d
     lift = ((2 * a**2 - far**2) * np.arcsin(a / far) + a * np.sqrt(far**2 - a**2)) / math.pi
     gap = contact.gap(state)[outside] - (lift - wanted.indentation + far**2 / 2)
     return {
-        **_radii(Paraboloid((1.0, 1.0)), place, cells),
+        "place": list(place),
+        "cells": cells,
         "area_error": area / (math.pi * a**2) - 1,
         "force_error": force / float(wanted.force) - 1,
         "gap_error": float(np.abs(gap).max() / wanted.indentation),
@@ -118,7 +115,8 @@ def sphere(spacing: float, grid: int, place: Sequence[float], control: str, deep
         force, radius = force_and_radius(contact, state)
         wanted = exact.sphere_contact(radius, 1.0, 1.0, 1.0)
         yield {
-            **_radii(Paraboloid((1.0, 1.0)), place, radius / spacing),
+            "place": list(place),
+            "cells": radius / spacing,
             "control": control,
             "branch": branch,
             "force": force / PULL_OFF,
@@ -137,7 +135,8 @@ def sphere_pull_off(spacing: float, grid: int, place: Sequence[float]) -> dict:
     force, last = largest_tension(contact, state, 0.05)
     off, jump = exact.sphere_pull_off(1.0, 1.0, 1.0), exact.sphere_jump_off(1.0, 1.0, 1.0)
     return {
-        **_radii(Paraboloid((1.0, 1.0)), place, off.contact_radius / spacing),
+        "place": list(place),
+        "cells": off.contact_radius / spacing,
         "pull_off_error": force / PULL_OFF - 1,
         "jump_off_error": -last.separation - jump.indentation,
     }
@@ -224,13 +223,9 @@ def _ellipse_at(indentation, radii, criterion):
     def state(axis_ratio):
         return elliptic.elliptic_jkr_contact(axis_ratio, radii, 1.0, 1.0, criterion)
 
-    flattest = float(elliptic.elliptic_pull_off(radii, 1.0, 1.0, criterion).semi_axes[1])
-    flattest /= float(elliptic.elliptic_pull_off(radii, 1.0, 1.0, criterion).semi_axes[0])
-    flattest = min(flattest, 1 / flattest)
-    limit = elliptic.elliptic_hertz_contact(1.0, radii, 1.0).semi_axes
-    limit = min(limit[0] / limit[1], limit[1] / limit[0])
-    found = brentq(lambda g: float(state(g).indentation) - indentation, limit * (1 + 1e-5), flattest)
-    return state(found)
+    ends = elliptic.elliptic_hertz_contact(1.0, radii, 1.0), elliptic.elliptic_pull_off(radii, 1.0, 1.0, criterion)
+    lowest, highest = (float(min(end.semi_axes) / max(end.semi_axes)) for end in ends)
+    return state(brentq(lambda g: float(state(g).indentation) - indentation, lowest * (1 + 1e-5), highest))
 
 
 def _ellipse_row(model, ratio, spacing, contact, state, wanted, unit):

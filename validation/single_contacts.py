@@ -37,15 +37,20 @@ def force_and_area(contact: BoundaryElements, state) -> tuple[float, float]:
     return contact.pressure(state) * contact.area, contact.area_fraction(state) * contact.area
 
 
+def _sphere(grid, offset, approach):
+    """Return contact, closed form, height of the summit (m) and state of a sphere at an approach, m."""
+    surface, top = bump(grid, _PERIOD, offset)
+    contact, exact = contact_of(surface, MATERIAL), SphereInCell(MATERIAL, 1.0, _PERIOD)
+    region = disc(grid, _PERIOD, exact.contact_radius(approach), offset)
+    return contact, exact, top, contact.relax_region(region, top - approach)
+
+
 def sphere_loop(grid: int, offset=(0.0, 0.0)) -> Iterator[dict]:
     """Unload a sphere from a strong contact and load it again, at the same approaches.
 
     `cells` is the contact radius of the closed form in cells.
     """
-    surface, top = bump(grid, _PERIOD, offset)
-    contact, exact = contact_of(surface, MATERIAL), SphereInCell(MATERIAL, 1.0, _PERIOD)
-    radius = exact.contact_radius(APPROACHES[0])
-    state = contact.relax_region(disc(grid, _PERIOD, radius, offset), top - APPROACHES[0])
+    contact, exact, top, state = _sphere(grid, offset, APPROACHES[0])
     unloading, loading = (("unloading", one) for one in APPROACHES), (("loading", one) for one in APPROACHES[-2::-1])
     for branch, approach in (*unloading, *loading):
         state = contact.equilibrium(state, top - approach)
@@ -57,7 +62,7 @@ def sphere_loop(grid: int, offset=(0.0, 0.0)) -> Iterator[dict]:
             "offset": list(offset),
             "branch": branch,
             "approach": approach,
-            "cells": radius / surface.spacing,
+            "cells": radius / contact.spacing,
             "area_error": area / (math.pi * radius**2) - 1,
             "force_error": (force - wanted) / max(abs(wanted), _PULL_OFF),
         }
@@ -65,11 +70,8 @@ def sphere_loop(grid: int, offset=(0.0, 0.0)) -> Iterator[dict]:
 
 def sphere_under_load(grid: int, offset=(0.0, 0.0), forces: Sequence[float] = (8.0, 4.0, 0.0, -4.0)) -> Iterator[dict]:
     """Unload a sphere under given forces (N, falling); the error of the approach is over the unit of length."""
-    surface, top = bump(grid, _PERIOD, offset)
-    contact, exact = contact_of(surface, MATERIAL), SphereInCell(MATERIAL, 1.0, _PERIOD)
-    radius = exact.loaded_radius(forces[0])
-    start = top - float(exact.approach(radius))
-    state = contact.relax_region(disc(grid, _PERIOD, radius, offset), start)
+    exact = SphereInCell(MATERIAL, 1.0, _PERIOD)
+    contact, _, top, state = _sphere(grid, offset, float(exact.approach(exact.loaded_radius(forces[0]))))
     for force in forces:
         state = contact.equilibrium(state, state.separation, Control(PRESSURE, force / contact.area))
         radius = exact.loaded_radius(force)
@@ -77,7 +79,7 @@ def sphere_under_load(grid: int, offset=(0.0, 0.0), forces: Sequence[float] = (8
             "grid": grid,
             "offset": list(offset),
             "force": force,
-            "cells": radius / surface.spacing,
+            "cells": radius / contact.spacing,
             "area_error": force_and_area(contact, state)[1] / (math.pi * radius**2) - 1,
             "approach_error": top - state.separation - float(exact.approach(radius)),
         }
@@ -101,27 +103,22 @@ def largest_tension(contact: BoundaryElements, state, step: float) -> tuple[floa
     k = int(np.argmax(tension))
     if not 0 < k < len(states) - 1:
         return float(tension[k]), states[-1]
-    left, right = ((tension[k] - tension[k + side]) / (u[k] - u[k + side]) for side in (-1, 1))
-    bend = (right - left) / ((u[k + 1] - u[k - 1]) / 2)
-    slope = left + (right - left) * (u[k] - u[k - 1]) / (u[k + 1] - u[k - 1])
-    return float(tension[k] - slope**2 / (2 * bend)), states[-1]
+    bend, slope, _ = np.polyfit(u[k - 1 : k + 2] - u[k], tension[k - 1 : k + 2], 2)
+    return float(tension[k] - slope**2 / (4 * bend)), states[-1]
 
 
 def sphere_pull_off(grid: int, offset=(0.0, 0.0), step: float = 0.05) -> dict:
     """Pull-off of a sphere, and the approach at jump-off, by steps of the approach (m)."""
-    surface, top = bump(grid, _PERIOD, offset)
-    contact, exact = contact_of(surface, MATERIAL), SphereInCell(MATERIAL, 1.0, _PERIOD)
-    first = -0.5
-    state = contact.relax_region(disc(grid, _PERIOD, exact.contact_radius(first), offset), top - first)
+    contact, exact, top, state = _sphere(grid, offset, -0.5)
     force, last = largest_tension(contact, state, step)
     return {
         "grid": grid,
         "offset": list(offset),
-        "cells": exact.loaded_radius(-0.999999 * exact.pull_off_force) / surface.spacing,
+        "cells": exact.loaded_radius(-0.999999 * exact.pull_off_force) / contact.spacing,
         "pull_off_error": force / exact.pull_off_force - 1,
         "jump_off_approach": top - last.separation,
         "jump_off_approach_exact": float(exact.approach(exact.jump_off_radius)),
-        "jump_off_cells": exact.jump_off_radius / surface.spacing,
+        "jump_off_cells": exact.jump_off_radius / contact.spacing,
     }
 
 
@@ -164,6 +161,14 @@ def ellipse(grid: int, angle: float, approaches: Sequence[float] = (2.0, 1.0, 0.
     return [row | {"pull_off": tension, "spacing": surface.spacing} for row in rows]
 
 
+def _pull(surface, face, let_go):
+    """Return compliance (m/N) and pull-off (N) of a flat face; `let_go` is the displacement at pull-off, m."""
+    contact = contact_of(surface, MATERIAL)
+    state = contact.relax_region(face, float(surface.heights.max()) + 0.02 * let_go)
+    compliance = 0.02 * let_go / -force_and_area(contact, state)[0]
+    return compliance, largest_tension(contact, state, 0.1 * let_go)[0]
+
+
 def flat_punch(grid: int, cells: float, square: bool = False) -> dict:
     """Pull-off of a flat punch with a radius, or half side, in cells, and the compliance of its unbroken contact.
 
@@ -174,11 +179,7 @@ def flat_punch(grid: int, cells: float, square: bool = False) -> dict:
     round_ = RoundPunch(MATERIAL, radius)
     let_go = round_.displacement_in_cell(round_.pull_off_force, _PERIOD)
     surface, face = punch(grid, _PERIOD, radius, 10 * let_go, square)
-    contact = contact_of(surface, MATERIAL)
-    base = float(surface.heights.max())
-    state = contact.relax_region(face, base + 0.02 * let_go)
-    compliance = 0.02 * let_go / -force_and_area(contact, state)[0]
-    tension, _ = largest_tension(contact, state, 0.1 * let_go)
+    compliance, tension = _pull(surface, face, let_go)
     nodes = math.sqrt(np.count_nonzero(face) / math.pi) * spacing
     return {
         "grid": grid,
@@ -196,16 +197,12 @@ def row_of_strips(grid: int, half_width: float) -> dict:
     exact = Strips(MATERIAL, cells / grid * _PERIOD, _PERIOD)
     let_go = exact.pull_off_tension * exact.compliance
     surface, face = strips(grid, _PERIOD, exact.half_width, 10 * let_go)
-    contact = contact_of(surface, MATERIAL)
-    base = float(surface.heights.max())
-    state = contact.relax_region(face, base + 0.02 * let_go)
-    compliance = 0.02 * let_go / -contact.pressure(state)
-    tension, _ = largest_tension(contact, state, 0.1 * let_go)
+    compliance, tension = _pull(surface, face, let_go)
     return {
         "grid": grid,
         "cells": cells,
-        "pull_off_error": tension / contact.area / exact.pull_off_tension - 1,
-        "compliance_error": compliance / exact.compliance - 1,
+        "pull_off_error": tension / _PERIOD**2 / exact.pull_off_tension - 1,
+        "compliance_error": compliance * _PERIOD**2 / exact.compliance - 1,
     }
 
 
