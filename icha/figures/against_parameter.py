@@ -39,6 +39,7 @@ from icha.figures.select import (
     ContactRuns,
     NothingToDraw,
     group_by_contact,
+    has_shape,
     select_detached_lines,
     select_runs,
     snapshot_label,
@@ -273,6 +274,10 @@ def pull_off(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] =
         f"Points at one slope{' or load' if by_load else ''} are drawn side by side; lines guide the eye.",
         "Without adhesion (open markers), pull-off is zero; a logarithmic axis is linear near zero."
         if not all(point.surface_energy for point in points)
+        else "",
+        """The pull-off force of a shape is the pull-off pressure times the area of the square; it is the variable
+        `pull_off_force`."""
+        if any(has_shape(campaign[each].to_dataset()) for each in studies)
         else "",
         grid_of_loops(campaign, studies),
     )
