@@ -54,14 +54,13 @@ class MergeRecord:
 
     Attributes
     ----------
-    union_radius : contact radius of the union when the spots united, m.
-    touching_radius : contact radius of the union, m, at which the two spots would just touch; below it they separate.
+    union_radius : contact radius of the union in the first equilibrium after the spots united, m; the union splits
+        below this radius. It is NaN until this equilibrium is found.
     contact_radius : (2,) float, contact radii of the two spots, m.
     columns : other properties of the two spots: for each name in `Sites.UNITED` an array of two rows.
     """
 
     union_radius: float
-    touching_radius: float
     contact_radius: np.ndarray
     columns: dict[str, np.ndarray]
 
@@ -87,7 +86,7 @@ class Sites:
     asperity : (n,) int, index of the asperity; -1 for a union.
     members : (n,) int, number of asperities united in the spot; asperities that the spot only covers do not count.
     union : (n,) object, `MergeRecord` of a union; None for other sites.
-    split_number : (n,) int, the same number for the two spots from one split of a union; -1 for other sites.
+    split_from : (n,) object, `MergeRecord` of the union from whose split the spot is; None for other sites.
     status : (n,) int, CONTACT, CANDIDATE or REMOVED.
     approach : (n,) float, last known approach of each site, m.
     response : (n,) float, derivative of the approach with respect to the mean separation.
@@ -106,7 +105,7 @@ class Sites:
     asperity: np.ndarray
     members: np.ndarray
     union: np.ndarray
-    split_number: np.ndarray
+    split_from: np.ndarray
     status: np.ndarray
     approach: np.ndarray
     response: np.ndarray
@@ -124,7 +123,7 @@ class Sites:
     @classmethod
     def empty(cls, law: JKR, asperities: Asperities) -> Sites:
         """Return a table without sites for a surface of these asperities."""
-        types = {"asperity": int, "members": int, "union": object, "split_number": int, "status": np.int8}
+        types = {"asperity": int, "members": int, "union": object, "split_from": object, "status": np.int8}
         types |= {"counts_as_old": bool}
         arrays: dict = {name: np.empty(0, types.get(name, float)) for name in _ARRAYS} | {"position": np.empty((0, 2))}
         modulus = law.material.contact_modulus
@@ -136,17 +135,17 @@ class Sites:
         """Mask of the sites that are in contact or candidates for contact, (n,) bool."""
         return self.status != REMOVED
 
-    def append(self, law: JKR, *, status, counts_as_old, split_number=-1, **more) -> Sites:
+    def append(self, law: JKR, *, status, counts_as_old, split_from=None, **more) -> Sites:
         """Return a table with k more sites; the response of each is -1 at first.
 
-        status, counts_as_old, split_number : one value for all new sites.
+        status, counts_as_old, split_from : one value for all new sites.
         more : position, height, radius_of_curvature, contact_radius, asperity, members, union and approach, arrays of
             k rows; contact_radius is at least that of an advancing edge at jump-off.
         """
         count = len(more["height"])
         more |= {
             "jump_off_approach": law.lowest_approach(more["radius_of_curvature"], more["contact_radius"]),
-            "split_number": np.full(count, split_number),
+            "split_from": np.full(count, split_from),
             "status": np.full(count, status, dtype=np.int8),
             "response": np.full(count, -1.0),
             "counts_as_old": np.full(count, counts_as_old),

@@ -17,7 +17,13 @@ from icha.equilibrium.iteration_state import IterationState
 from icha.equilibrium.jumps import add_candidates, apply_jump_in, apply_jump_off, break_closest_to_jump_off
 from icha.equilibrium.newton import newton_step, solve_response
 from icha.equilibrium.sites import CANDIDATE, CONTACT, AsperityContact, ContactState
-from icha.equilibrium.unions import absorb_new_asperities, merge_overlapping, set_union_heights, split_unions
+from icha.equilibrium.unions import (
+    absorb_new_asperities,
+    merge_overlapping,
+    record_union_radii,
+    set_union_heights,
+    split_unions,
+)
 
 # The search applies events when its error is at most _EVENT_TOLERANCE h_rms. An event waits until the equations are
 # solved if its condition is exceeded by less than _EVENT_MARGIN times the error.
@@ -164,6 +170,7 @@ def _build_contact_state(state, evaluation, control):
     radius = np.where(touching, evaluation.a, 0.0)
     lowest = contact.law.lowest_approach(state.sites.radius_of_curvature, radius)
     found = {"approach": evaluation.approach, "response": response}
+    found["union"] = record_union_radii(state.sites, radius)
     sites = replace(state.sites, contact_radius=radius, jump_off_approach=lowest, **found)
     return ContactState(
         separation=evaluation.separation,

@@ -15,7 +15,6 @@ from icha.contact.model import COALESCENCE, JUMP_IN, SPLIT
 from icha.equilibrium.equations import Evaluation
 from icha.equilibrium.iteration_state import IterationState
 from icha.equilibrium.sites import CANDIDATE, CONTACT, MergeRecord, Sites
-from icha.surfaces.square import periodic_difference
 
 
 def merge_overlapping(state: IterationState, evaluation: Evaluation, margin=0.0, *, deep=False) -> IterationState:
@@ -23,8 +22,8 @@ def merge_overlapping(state: IterationState, evaluation: Evaluation, margin=0.0,
 
     The unions have no heights before `set_union_heights` is called. If no spots merge, return `state` itself.
     margin : error of the approaches, m; two spots merge only if they would overlap in spite of such an error.
-    deep : whether only those pairs merge in which one spot covers the centre of the other. On unloading, two spots
-        from the split of one union merge again only if `deep` is True.
+    deep : whether only those pairs merge in which one spot covers the centre of the other. Otherwise, two spots from
+        the split of one union merge again only on loading, and not before their area is that of the first coalescence.
     """
     sites, law, cell, a = state.sites, state.contact.law, state.contact.asperities.cell, evaluation.a
     pairs = _select_merging_pairs(state, evaluation, margin, deep)
@@ -32,7 +31,7 @@ def merge_overlapping(state: IterationState, evaluation: Evaluation, margin=0.0,
         return state
     (i, j), position, R = pairs.T, sites.position, sites.radius_of_curvature
     centre, radius, curvature = equivalent_spots(law, position[i], a[i], R[i], position[j], a[j], R[j], cell)
-    unions = _record_unions(state, pairs, a, radius)
+    unions = _record_unions(sites, pairs, a)
     # A candidate in a pair makes contact before it becomes part of the union.
     candidates = pairs[sites.status[pairs] == CANDIDATE]
     state = state.with_events(JUMP_IN, sites.position[candidates], 1, 0.0, sites.asperity[candidates])
@@ -81,9 +80,11 @@ def _select_merging_pairs(state, evaluation, margin, deep):
     depth = a[first] + a[second] - r
     present = (a > 0) & sites.present[: len(a)]
     overlap = (depth > 0) & present[first] & present[second]
-    if state.unloading and not deep:
-        # Two spots that have just split would otherwise merge and split again and again during the iteration.
-        overlap &= (sites.split_number[first] < 0) | (sites.split_number[first] != sites.split_number[second])
+    if not deep:
+        # On unloading, two spots that have just split would otherwise merge and split again and again in the iteration.
+        origin = sites.split_from[first]
+        for k in np.flatnonzero(overlap & (origin == sites.split_from[second]) & np.not_equal(origin, None)):
+            overlap[k] = not state.unloading and np.hypot(a[first[k]], a[second[k]]) >= origin[k].union_radius
     overlap = np.flatnonzero(overlap)
     if margin > 0 and len(overlap):
         # An error of the approach causes an error of the radius that is about R/(2a) times as large.
@@ -96,23 +97,28 @@ def _select_merging_pairs(state, evaluation, margin, deep):
     return disjoint_pairs(overlapping_pairs(sites.position, a, first[overlap], second[overlap], r[overlap]))
 
 
-def _record_unions(state, pairs, a, radius):
-    """Return a `MergeRecord` for each of k pairs; `a` (n,) and `radius` (k,): contact radii of sites and unions, m."""
+def _record_unions(sites, pairs, a):
+    """Return a `MergeRecord` for each of k pairs of sites; `a` (n,): contact radii of the sites, m."""
     unions = np.full(len(pairs), None)
-    sites, (i, j) = state.sites, pairs.T
-    offset = periodic_difference(sites.position[j], sites.position[i], state.contact.asperities.cell)
-    touching = radius * np.minimum(np.linalg.norm(offset, axis=1) / (a[i] + a[j]), 1.0)
     for k, pair in enumerate(pairs):
-        columns = {name: getattr(sites, name)[pair] for name in Sites.UNITED}
-        unions[k] = MergeRecord(radius[k], touching[k], a[pair], columns)
+        unions[k] = MergeRecord(np.nan, a[pair], {name: getattr(sites, name)[pair] for name in Sites.UNITED})
+    return unions
+
+
+def record_union_radii(sites: Sites, a) -> np.ndarray:
+    """Return the column `union` of sites with contact radii a (n,), m, with the radii of new unions in equilibrium."""
+    unions = sites.union.copy()
+    for k in np.flatnonzero(np.not_equal(unions, None) & sites.present):
+        if np.isnan(unions[k].union_radius):
+            unions[k] = replace(unions[k], union_radius=a[k])
     return unions
 
 
 def split_unions(state: IterationState, evaluation: Evaluation) -> IterationState:
-    """Split every union with a contact radius below its `touching_radius`; if there is none, return `state` itself."""
+    """Split every union with a contact radius below its `union_radius`; if there is none, return `state` itself."""
     a, sites = evaluation.a, state.sites  # the evaluation lacks sites that were added in this round
-    touching = np.array([0.0 if union is None else union.touching_radius for union in sites.union[: len(a)]])
-    split = np.flatnonzero((sites.status[: len(a)] == CONTACT) & (a < touching))
+    least = np.array([0.0 if union is None else union.union_radius for union in sites.union[: len(a)]])
+    split = np.flatnonzero((sites.status[: len(a)] == CONTACT) & (a < least))
     for site in split.tolist():
         state = _split_union(state, site, a[site])
     return state
@@ -122,7 +128,7 @@ def _split_union(state, site, a):
     """Replace a union by its two spots, log the split, and return the new state; `a` is the radius of the union, m.
 
     The radius of each spot is its radius at coalescence, times the present radius of the union divided by the
-    `union_radius`. Both spots get the same `split_number`. Asperities that the union only covered lose contact.
+    `union_radius`. Asperities that the union only covered lose contact.
     """
     sites, law, union = state.sites, state.contact.law, state.sites.union[site]
     contact_radius = union.contact_radius * (a / union.union_radius)
@@ -139,7 +145,7 @@ def _split_union(state, site, a):
         approach=law.receding.approach(contact_radius, R),
         status=CONTACT,
         counts_as_old=True,
-        split_number=np.max(sites.split_number) + 1,
+        split_from=union,
     )
     # The approaches of other asperities under the union are not known.
     last_separation = np.where(merged, np.inf, state.last_separation)

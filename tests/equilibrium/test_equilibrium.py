@@ -230,8 +230,8 @@ def assert_consistent(contact, state):
     assert np.max(np.abs(error), initial=0) <= 2e-7 * contact.rms_height
     first, second, r = all_pairs(spots.position, period)
     # Only the two spots of one split may overlap, until the unloading ends.
-    split = state.sites.split_number[state.sites.contact_radius > 0]
-    together = (split[first] >= 0) & (split[first] == split[second])
+    split = state.sites.split_from[state.sites.contact_radius > 0]
+    together = np.not_equal(split[first], None) & (split[first] == split[second])
     assert np.all((r >= spots.contact_radius[first] + spots.contact_radius[second]) | together)
     assert np.all(
         np.isin(state.site_of_asperity[state.site_of_asperity >= 0], np.flatnonzero(state.sites.contact_radius > 0))
