@@ -49,7 +49,7 @@ TRACES |= {"HOSTNAME": "mirabellenrechner", "TOKEN": "hagebuttengeheimnis"}
 # Number of random cases of a test; `--hypothesis-profile thorough` tries more. The cases are the same in every session,
 # so no test fails by chance.
 settings.register_profile("fast", max_examples=24, deadline=None, derandomize=True, database=None)
-settings.register_profile("thorough", settings.get_profile("fast"), max_examples=300)
+settings.register_profile("thorough", settings.get_profile("fast"), max_examples=100)
 settings.load_profile("fast")
 
 # Files with the longest tests, the longest first. If such a file came last, one core would wait for it. With

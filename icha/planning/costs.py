@@ -55,14 +55,13 @@ LAWS = {
     "boundary_elements, loop": PowerLaw(5.5e-4, {"nodes": 1.0}),
     "boundary_elements": PowerLaw(2.6e-7, {"nodes": 1.22, "stops": 0.49}),
     "boundary_elements, adhesion": PowerLaw(1.5e-3, {"nodes": 0.35, "stops": 0.55, "spots": 0.71}),
+    # A loop with adhesion on a free square, where the transforms have more cells than the square.
+    "boundary_elements, free loop": PowerLaw(5e-4, {"nodes": 1.05}),
 }
 # Time of a loop of asperities with adhesion, divided by the time without: each jump of a spot takes several steps.
 _STICKY_LOOP = 5.0
 # A loop with boundary elements and adhesion takes the time of this number of targets.
 _STICKY_LOOP_STOPS = 100
-# On a free square, a loop with boundary elements and adhesion takes longer by this factor, because the transforms have
-# twice the side. Seven of ten measured loops of indenters are then within a factor of two.
-_FREE_LOOP = 4.0
 
 
 @dataclass(frozen=True)
@@ -129,11 +128,13 @@ def spots(summits: float, load: float) -> float:
     return max(1.0, summits * min(0.6, math.sqrt(load)))
 
 
-def run_seconds(model: str, *, adhesive: bool, loop: bool, nodes: float, spots: float, stops: int) -> float:
+def run_seconds(
+    model: str, *, adhesive: bool, loop: bool, nodes: float, spots: float, stops: int, free: bool = False
+) -> float:
     """Return the expected time in s of a run for loading only, or of one loop; arguments are those of `run_cost`."""
     law, factor = LAWS.get(f"{model}, adhesion" if adhesive else model, LAWS[model]), 1.0
     if loop and adhesive and MODELS[model].by_cells:
-        stops = _STICKY_LOOP_STOPS
+        law, stops = LAWS[f"{model}, free loop"] if free else law, _STICKY_LOOP_STOPS
     elif loop:
         law, factor = LAWS[f"{model}, loop"], _STICKY_LOOP if adhesive else 1.0
     return FILES + factor * law.seconds(nodes=nodes, spots=spots, stops=stops)
@@ -170,7 +171,7 @@ def run_cost(
     free : True if the surface is a free square.
     """
     most, nodes, size = spots(summits, load), grid**2, RUN_SIZES[model]
-    seconds = run_seconds(model, adhesive=adhesive, loop=bool(legs), nodes=nodes, spots=most, stops=stops)
+    seconds = run_seconds(model, adhesive=adhesive, loop=bool(legs), nodes=nodes, spots=most, stops=stops, free=free)
     seconds *= max(1.0, (size.sticky_loop if legs else size.sticky) / energy_ratio)
     steps: float = stops
     if legs:
@@ -178,7 +179,6 @@ def run_cost(
         further = DEFAULT_STEP / max_step
         steps = (1 + legs) / 2 * (120 * further + (40 if adhesive else 0.75) * most)
         seconds *= (1 + legs) / 2 * further
-        seconds *= _FREE_LOOP if free and adhesive and MODELS[model].by_cells else 1
     snapshots += bool(legs)
     memory = JOB_MEMORY + 9 * MiB * (1 + bool(legs)) + size.arrays * _DOUBLE * nodes + size.summit * summits
     values = 20e3 + 57 * most * max(snapshots, 1) + 160 * steps + 20e3 * bool(legs)
