@@ -83,8 +83,9 @@ def _select_merging_pairs(state, evaluation, margin, deep):
     if not deep:
         # On unloading, two spots that have just split would otherwise merge and split again and again in the iteration.
         origin = sites.split_from[first]
-        for k in np.flatnonzero(overlap & (origin == sites.split_from[second]) & np.not_equal(origin, None)):
-            overlap[k] = not state.unloading and np.hypot(a[first[k]], a[second[k]]) >= origin[k].union_radius
+        for k in np.flatnonzero(overlap & (origin == sites.split_from[second])):
+            if origin[k] is not None:
+                overlap[k] = not state.unloading and np.hypot(a[first[k]], a[second[k]]) >= origin[k].union_radius
     overlap = np.flatnonzero(overlap)
     if margin > 0 and len(overlap):
         # An error of the approach causes an error of the radius that is about R/(2a) times as large.
@@ -108,8 +109,8 @@ def _record_unions(sites, pairs, a):
 def record_union_radii(sites: Sites, a) -> np.ndarray:
     """Return the column `union` of sites with contact radii a (n,), m, with the radii of new unions in equilibrium."""
     unions = sites.union.copy()
-    for k in np.flatnonzero(np.not_equal(unions, None) & sites.present):
-        if np.isnan(unions[k].union_radius):
+    for k in np.flatnonzero(sites.status == CONTACT):
+        if unions[k] is not None and np.isnan(unions[k].union_radius):
             unions[k] = replace(unions[k], union_radius=a[k])
     return unions
 
