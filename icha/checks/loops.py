@@ -21,7 +21,7 @@ CELL_LOSS_LIMIT = 1e-3
 # Largest loss of a loop of boundary elements without adhesion, divided by the largest work. The exact loss is zero.
 CELL_CLOSURE_LIMIT = 1e-4
 # Largest gain of energy by unions of spots and splits of unions, divided by the largest work. The rule of unions
-# nearly conserves energy: without adhesion, loops close within a few hundredths of a per cent (docs/hysteresis.md).
+# nearly conserves energy: without adhesion, loops close within 0.004 % (docs/hysteresis.md).
 UNION_LIMIT = 1e-3
 
 # Energies of a loop are differences of works. A run whose energies are wrong keeps its pull-off, areas and gaps, which
