@@ -99,56 +99,36 @@ def cost(rows: Rows) -> Table:
     return Table(["indenter", "grid", "equilibria", "processor"], lines, numbers=True)
 
 
-_CELLS = {"cells": ("cells in the radius", ".3g")}
-_ERRORS = {"force_error": ("force", "%"), "area_error": ("area", "%")}
-_PUNCH = {"square": ("square (1) or round (0)", "g"), "cells": ("radius in cells", "g")}
-_PUNCH |= {"stiffness": ("stiffness", ".4g"), "stiffness_of_nodes": ("stiffness by nodes", ".4g")}
-_PUNCH |= {"pull_off": ("pull-off", ".4g"), "pull_off_of_nodes": ("pull-off by nodes", ".4g")}
-_WAVE = {"wavelength": ("λ", "g"), "amplitude": ("A", "g"), "branch": ("branch", "s"), "control": ("jump under", "s")}
-_WAVE |= {"cells": ("radius in cells", ".3g"), "force": ("force", ".4f"), "force_exact": ("exact", ".4f")}
-_WAVE |= {"force_error": ("force error", "%"), "indentation_error": ("indentation error", ".4f")}
-_WAVE |= {"radius_error": ("radius error over λ", ".3f")}
-_ALONG = {"waves": ("waves", "g"), "cells": ("radius in cells", "g"), "wave_cells": ("cells in a wave", ".3g")}
-_ALONG |= {"error": ("K, circular front", "%"), "straight_error": ("K, straight front", "%")}
-_ACROSS = {"cells": ("radius in cells", ".3g"), "wave_cells": ("cells in a wave", ".3g")}
-_ACROSS |= {"amplitude_error": ("K", "%"), "phase_error": ("phase error in degrees", ".2f")}
-_OTHER = {"kind": ("contact", "s"), "thickness": ("thickness", "s"), "poisson": ("ν", "s")}
-_OTHER |= {"area": ("A/A0", ".3f"), "area_error": ("area", ".1g"), "force_error": ("force", ".1g")}
-_OTHER |= {"gap_error": ("gap", ".1g"), "kernel_error": ("compliance", "s")}
-_LIMITS = {
-    "limit": ("limit", "s"),
-    "thickness": ("thickness over √(Rδ)", ".3g"),
-    "cells": ("in cells", ".3g"),
-    "area_over": ("A/(πRδ)", ".3f"),
-    "force_error": ("force", "%"),
-}
-_BALANCE = {"energy": ("U_full/Δγ", "g"), "rms_height": ("h_rms", ".3f"), "expected": ("1 − U_full/Δγ", "g")}
-_BALANCE |= {"loading_law": ("loading, law", ".3f"), "unloading_law": ("unloading, law", ".3f")}
-_BALANCE |= {"loading_contact_radius": ("loading, a³", ".3f"), "loading_indentation": ("loading, δ", ".3f")}
-_BALANCE |= {"unloading_contact_radius": ("unloading, a³", ".3f"), "unloading_indentation": ("unloading, δ", ".3f")}
-_BALANCE |= {"pull_off": ("pull-off", ".3f"), "loss_over_area": ("loss/(Δγ A)", ".3f")}
-_DIRECTION = {"ratio": ("ratio of works", "g"), "cells": ("cells in the radius", ".3g"), "kind": ("pull-off of", "s")}
-_DIRECTION |= {"advancing": ("advancing work", ".1%"), "standing": ("standing radius", ".1%")}
-_DIRECTION |= {"stiffness": ("stiffness 2E*a", ".1%"), "receding": ("receding work", ".1%")}
-_DIRECTION |= {"pull_off": ("pull-off", "%"), "front": ("front dissipation", "%")}
-_DIRECTION |= {"unattributed": ("unattributed loss", ".2%")}
-_GRID = {"grid": ("grid", "g"), "wave_cells": ("cells in the shortest wave", "g"), "steps": ("equilibria", "g")}
-_GRID |= {"pull_off": ("pull-off", ".4f"), "loss": ("loss", ".3f"), "largest_area": ("largest area", ".3f")}
-_GRID |= {"seconds": ("time in s", ".1f")}
-
-
-# Tables with a line for every row of a part.
+# Tables with a line for every row of a part: by name, and by part if it has another name.
 _BY_ROW = {
-    "punch": _PUNCH,
-    "cone": {"adhesion": ("adhesion", "s")}
-    | _CELLS
-    | {"force_error": ("force", "%"), "approach_error": ("indentation", "%")},
-    "along": _ALONG,
-    "across": _ACROSS,
-    "layer_limits": _LIMITS,
-    "balance": _BALANCE,
-    "convergence": _GRID,
-    "direction": _DIRECTION,
+    "ellipse": """model: theory s; ratio: ratio of radii g; cells: cells in the radius .3g;
+        indentation: indentation .2f; force_error: force %; area_error: area %""",
+    "ellipse_pull_off ellipse": "model: theory s; ratio: ratio of radii g; pull_off_error: pull-off %",
+    "wave": """wavelength: λ g; amplitude: A g; branch: branch s; control: jump under s; cells: radius in cells .3g;
+        force: force .4f; force_exact: exact .4f; force_error: force error %;
+        indentation_error: indentation error .4f; radius_error: radius error over λ .3f""",
+    "without_adhesion": """kind: contact s; thickness: thickness .2g; poisson: ν .2g; area: A/A0 .3f;
+        area_error: area .1g; force_error: force .1g; gap_error: gap .1g; kernel_error: compliance .2g""",
+    "punch": """square: square (1) or round (0) g; cells: radius in cells g; stiffness: stiffness .4g;
+        stiffness_of_nodes: stiffness by nodes .4g; pull_off: pull-off .4g;
+        pull_off_of_nodes: pull-off by nodes .4g""",
+    "cone": "adhesion: adhesion s; cells: cells in the radius .3g; force_error: force %; approach_error: indentation %",
+    "along": """waves: waves g; cells: radius in cells g; wave_cells: cells in a wave .3g; error: K, circular front %;
+        straight_error: K, straight front %""",
+    "across": """cells: radius in cells .3g; wave_cells: cells in a wave .3g; amplitude_error: K %;
+        phase_error: phase error in degrees .2f""",
+    "layer_limits": """limit: limit s; thickness: thickness over √(Rδ) .3g; cells: in cells .3g;
+        area_over: A/(πRδ) .3f; force_error: force %""",
+    "balance": """energy: U_full/Δγ g; rms_height: h_rms .3f; expected: 1 − U_full/Δγ g;
+        loading_law: loading, law .3f; unloading_law: unloading, law .3f; loading_contact_radius: loading, a³ .3f;
+        loading_indentation: loading, δ .3f; unloading_contact_radius: unloading, a³ .3f;
+        unloading_indentation: unloading, δ .3f; pull_off: pull-off .3f; loss_over_area: loss/(Δγ A) .3f""",
+    "convergence": """grid: grid g; wave_cells: cells in the shortest wave g; steps: equilibria g;
+        pull_off: pull-off .4f; loss: loss .3f; largest_area: largest area .3f; seconds: time in s .1f""",
+    "direction": """ratio: ratio of works g; cells: cells in the radius .3g; kind: pull-off of s;
+        advancing: advancing work .1%; standing: standing radius .1%; stiffness: stiffness 2E*a .1%;
+        receding: receding work .1%; pull_off: pull-off %; front: front dissipation %;
+        unattributed: unattributed loss .2%""",
 }
 _by_radius = partial(
     by_radius, edges=(4, 8, 12), places={"general": single.PLACES[::3], "node, middle": single.PLACES[1:3]}
@@ -157,14 +137,6 @@ _by_radius = partial(
 
 def tables(rows: Rows) -> dict[str, Table]:
     """Return all tables of the page from the rows of all parts."""
-    ellipses = [row for row in rows["ellipse"] if "cells" in row]
-    offs = [row for row in rows["ellipse"] if "pull_off_error" in row]
-    model = {"model": ("theory", "s"), "ratio": ("ratio of radii", "g")}
-    others = [
-        row
-        | {name: "" if row[name] is None else f"{row[name]:.2g}" for name in ("thickness", "poisson", "kernel_error")}
-        for row in rows["without_adhesion"]
-    ]
     by_control = {how: [row for row in rows["sphere"] if row["control"] == how] for how in ("separation", "load")}
     at_radius = {"force_error": "force at the radius", "approach_error": "indentation at the radius"}
     given = {"separation": "force at the indentation", "load": "indentation at the force"}
@@ -173,11 +145,7 @@ def tables(rows: Rows) -> dict[str, Table]:
         "hertz": _by_radius(rows["hertz"], {"area_error": "area", "force_error": "force", "gap_error": "gap"}),
         **{how: _by_radius(by_control[how], at_radius | {"given_error": given[how]}) for how in given},
         "pull_off": _by_radius(rows["pull_off"], {"pull_off_error": "pull-off", "jump_off_error": "jump-off"}),
-        "ellipse": by(ellipses, model | _CELLS | {"indentation": ("indentation", ".2f")} | _ERRORS),
-        "ellipse_pull_off": by(offs, model | {"pull_off_error": ("pull-off", "%")}),
-        "wave": by([row for row in rows["wave"] if "force_error" in row], _WAVE),
-        "without_adhesion": by(others, _OTHER),
-        **{part: by(rows[part], columns) for part, columns in _BY_ROW.items()},
+        **{name.split()[0]: by(rows[name.split()[-1]], columns) for name, columns in _BY_ROW.items()},
     }
     return {f"indenter_{name}": table for name, table in found.items()} | {"benchmarks_indenter": cost(rows)}
 

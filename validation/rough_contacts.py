@@ -47,21 +47,41 @@ def states_at(contact: BoundaryElements, separations: Iterable[float]):
         yield state
 
 
+def _rows_at(surface, material, separations, rms_slope):
+    """Yield loads, areas and patches at falling separations (h_rms) as rows."""
+    contact = contact_of(surface, material)
+    for separation, state in zip(separations, states_at(contact, separations), strict=True):
+        yield {
+            "grid": surface.grid,
+            "separation": separation,
+            "reduced_pressure": contact.pressure(state) / (material.contact_modulus * rms_slope),
+            "area": contact.area_fraction(state),
+            "energetic_area": contact.energetic_area_fraction(state),
+            "patches": contact.spot_count(state),
+        }
+
+
 def by_cells_per_wave(waves: int, cells: Sequence[int], separations: Sequence[float]) -> Iterator[dict]:
     """Solve one surface on several grids at falling separations (h_rms)."""
     coarse = rough(waves * min(cells), waves, min(cells))
     for count in cells:
-        surface = coarse.refined(count // min(cells))
-        contact = contact_of(surface, SOFT)
-        for separation, state in zip(separations, states_at(contact, separations), strict=True):
-            yield {
-                "cells": count,
-                "grid": surface.grid,
-                "separation": separation,
-                "reduced_pressure": contact.pressure(state) / (SOFT.contact_modulus * coarse.rms_slope),
-                "area": contact.area_fraction(state),
-                "patches": contact.spot_count(state),
-            }
+        for row in _rows_at(coarse.refined(count // min(cells)), SOFT, separations, coarse.rms_slope):
+            yield row | {"cells": count}
+
+
+def towards_short_range(
+    surface: Surface, separations: Sequence[float], lengths: Sequence[tuple[float, int]], surface_energy: float
+) -> Iterator[dict]:
+    """Solve falling separations (h_rms) at given ranges (m) on refined grids that resolve them, and in the limit.
+
+    Each range has its refinement. The limit has the shortest range, on the grid of the surface.
+    """
+    for length, refinement in (*lengths, (0.0, 1)):
+        reach = length or min(length for length, _ in lengths)
+        material = Material(SOFT.contact_modulus, surface_energy, reach)
+        for row in _rows_at(surface.refined(refinement), material, separations, surface.rms_slope):
+            # In the limit, both areas are equal.
+            yield row | {"range": length, "energetic_area": row["energetic_area" if length else "area"]}
 
 
 def symmetries(surface: Surface, separation: float, material: Material = SOFT) -> Iterator[dict]:
@@ -74,40 +94,30 @@ def symmetries(surface: Surface, separation: float, material: Material = SOFT) -
     }
 
     def solved(heights):
-        contact = contact_of(Surface(heights, surface.period), material)
+        contact = contact_of(Surface(np.ascontiguousarray(heights), surface.period), material)
         (state,) = states_at(contact, [separation])
         return contact.pressure(state), contact.area_fraction(state), contact.fractions(state)
 
     pressure, area, fraction = solved(surface.heights)
     for name, turn in turns.items():
-        turned = solved(np.ascontiguousarray(turn(surface.heights)))
-        yield {
-            "what": name,
-            "pressure_error": turned[0] / pressure - 1,
-            "area_error": turned[1] / area - 1,
-            "fraction_error": float(np.abs(turned[2] - turn(fraction)).max()),
-        }
+        yield {"what": name} | _differences(solved(turn(surface.heights)), (pressure, area, turn(fraction)))
 
 
 def by_steps(surface: Surface, separation: float, counts: Sequence[int]) -> list[dict]:
     """Reach a separation from 3 (both h_rms) in several numbers of steps, and compare with the largest number."""
-    contact = contact_of(surface, SOFT)
-    unit, found = surface.rms_height, {}
+    contact, found = contact_of(surface, SOFT), {}
     for count in sorted(counts, reverse=True):
         state = contact.untouched()
         for u in np.linspace(3.0, separation, count + 1):
-            state = contact.equilibrium(state, u * unit)
-        found[count] = state
-    best = found[max(counts)]
-    return [
-        {
-            "steps": count,
-            "pressure_error": contact.pressure(state) / contact.pressure(best) - 1,
-            "area_error": contact.area_fraction(state) / contact.area_fraction(best) - 1,
-            "fraction_error": float(np.abs(contact.fractions(state) - contact.fractions(best)).max()),
-        }
-        for count, state in found.items()
-    ]
+            state = contact.equilibrium(state, u * surface.rms_height)
+        found[count] = contact.pressure(state), contact.area_fraction(state), contact.fractions(state)
+    return [{"steps": count} | _differences(each, found[max(counts)]) for count, each in found.items()]
+
+
+def _differences(found, best):
+    """Return differences of pressure and area, relative, and the largest difference of the fractions of contact."""
+    errors = {"pressure_error": found[0] / best[0] - 1, "area_error": found[1] / best[1] - 1}
+    return errors | {"fraction_error": float(np.abs(found[2] - best[2]).max())}
 
 
 def loop(surface: Surface, largest_pressure: float, step: float, material: Material = SOFT) -> dict:
@@ -159,26 +169,3 @@ def without_adhesion(surface: Surface, reduced_pressures: Sequence[float]) -> It
             "gap_error": float(np.sqrt(np.mean((gap - theirs.gap) ** 2))) / surface.rms_height,
             "area_error": len(state.cells) / np.count_nonzero(theirs.traction > 0) - 1,
         }
-
-
-def towards_short_range(
-    surface: Surface, separations: Sequence[float], lengths: Sequence[tuple[float, int]], surface_energy: float
-) -> Iterator[dict]:
-    """Solve falling separations (h_rms) at given ranges (m) on refined grids that resolve them, and in the limit.
-
-    Each range has its refinement. The limit has the shortest range, on the grid of the surface.
-    """
-    shortest = min(length for length, _ in lengths)
-    for length, refinement in (*lengths, (0.0, 1)):
-        material = Material(SOFT.contact_modulus, surface_energy, length or shortest)
-        contact = contact_of(surface.refined(refinement), material)
-        for u, state in zip(separations, states_at(contact, separations), strict=True):
-            area = contact.area_fraction(state)
-            yield {
-                "range": length,
-                "grid": surface.grid * refinement,
-                "separation": u,
-                "pressure": contact.pressure(state) / (material.contact_modulus * surface.rms_slope),
-                "zero_gap_area": area,
-                "energetic_area": contact.energetic_area_fraction(state) if length else area,
-            }

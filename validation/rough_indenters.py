@@ -67,21 +67,23 @@ def follow(surface: Surface, material: Material, indentation: float) -> xr.Datas
         return simulate(surface, material, path, model="boundary_elements")
 
 
+def _timed_loop(surface, indentation):
+    """Return a row with the computing time of a loop to an indentation (m), and the run."""
+    clock = time.process_time()
+    run = follow(surface, ADHESIVE, indentation)
+    seconds, pull_off = time.process_time() - clock, -float(run.nominal_pressure.min()) * surface.period**2 / PULL_OFF
+    return {"grid": surface.grid, "steps": run.sizes["step"], "seconds": seconds, "pull_off": pull_off}, run
+
+
 def rough_loop(grid: int, waves: tuple[float, float] = (2.0, 1.0), seed: int = 1) -> dict:
     """Follow a loop of one rough sphere, with computing time; grid: 64 cells along a side times a power of two.
 
     The side has the length 8 (dgamma R^2/E*)^(1/3), and the energy of full contact is dgamma/5.
     """
     surface = rough_sphere(64, 8.0, waves, 0.2, seed, grid // 64)
-    clock = time.process_time()
-    run = follow(surface, ADHESIVE, 1.0)
-    return {
-        "grid": grid,
-        "waves": list(waves),
+    row, run = _timed_loop(surface, 1.0)
+    return row | {
         "wave_cells": waves[1] / surface.spacing,
-        "steps": run.sizes["step"],
-        "seconds": time.process_time() - clock,
-        "pull_off": -float(run.nominal_pressure.min()) * surface.period**2 / PULL_OFF,
         "largest_area": float(run.contact_area_fraction.max()) * surface.period**2,
         "loss": float(run.hysteresis_loss) * surface.period**2,
         "failed_checks": run.attrs.get("failed_checks", ""),
@@ -90,11 +92,7 @@ def rough_loop(grid: int, waves: tuple[float, float] = (2.0, 1.0), seed: int = 1
 
 def smooth_loop(grid: int = 96) -> dict:
     """Follow a loop of the smooth sphere to 2.4 contact radii of zero load, with computing time."""
-    surface = Surface(np.zeros((grid, grid)), grid / 6, "free", Paraboloid((1.0, 1.0)))
-    clock = time.process_time()
-    run = follow(surface, ADHESIVE, 4.0)
-    pull_off = -float(run.nominal_pressure.min()) * surface.period**2 / PULL_OFF
-    return {"grid": grid, "steps": run.sizes["step"], "seconds": time.process_time() - clock, "pull_off": pull_off}
+    return _timed_loop(Surface(np.zeros((grid, grid)), grid / 6, "free", Paraboloid((1.0, 1.0))), 4.0)[0]
 
 
 def directed_sphere(spacing: float, ratio: float, radius: float, grid: int = 64) -> dict:
@@ -155,8 +153,6 @@ def conformal_sphere(energy: float, seed: int, grid: int = 128) -> dict:
         row[f"{branch}_law"] = float(np.mean(local))
     return row | {
         "pull_off": -force.min() / PULL_OFF,
-        "loss": float(run.hysteresis_loss) * surface.period**2,
-        "largest_area": float(area.max()),
         "loss_over_area": float(run.hysteresis_loss) * surface.period**2 / float(area.max()),
         "failed_checks": run.attrs.get("failed_checks", ""),
     }

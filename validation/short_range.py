@@ -170,7 +170,7 @@ def by_grid(rows: list[dict]) -> Table:
 
 def towards_zero(rows: list[dict]) -> Table:
     """Table of load and areas at falling ranges, their linear extrapolation to zero, and the limit."""
-    names = {"pressure": "p\\*", "zero_gap_area": "area of zero gap", "energetic_area": "energetic area"}
+    names = {"reduced_pressure": "p\\*", "area": "area of zero gap", "energetic_area": "energetic area"}
     lines = []
     for separation in sorted({row["separation"] for row in rows}, reverse=True):
         *finite, limit = sorted((r for r in rows if r["separation"] == separation), key=lambda row: -row["range"])
@@ -183,49 +183,27 @@ def towards_zero(rows: list[dict]) -> Table:
     return Table(["u/h_rms", "range", "grid", *names.values()], lines)
 
 
-_SAME = {"pressure_error": ("load", ".2g"), "area_error": ("area", ".2g")}
-_SAME |= {"fraction_error": ("largest difference of a cell", ".2g")}
-_JUMP_IN = {"approach": ("approach", ".6g"), "approach_exact": ("Wu", ".6g")}
-_JUMP_IN |= {"spots_before": ("spots before", "g"), "spots_after": ("after", "g")}
-_WAVE = {"alpha": ("α", "g"), "grid": ("grid", "g"), "psi": ("ψ", "g")}
-_WAVE |= {"cells": ("half-width in cells", ".3g"), "width_error": ("width", "%"), "pressure": ("p/p\\*", ".4g")}
-_WAVE |= {"pressure_exact": ("exact", ".4g"), "pressure_error": ("pressure", "%"), "energy_error": ("energy", "%")}
-_LOOP = {"with": ("adhesion", "s"), "step": ("longest step/h_rms", "g"), "steps": ("equilibria", "g")}
-_LOOP |= {"largest_work": ("largest work", ".4g"), "work": ("work of the loop", ".2e"), "jump_in": ("jumps in", ".2e")}
-_LOOP |= {"jump_off": ("jumps off", ".2e"), "coalescence": ("merging and splitting", ".2e")}
-_LOOP |= {"unattributed": ("no event", ".2e"), "not_closed": ("imbalance", ".2e")}
-_GRID = {"grid": ("grid", "g")}
-_ERRORS = {"area_error": ("area", "%"), "force_error": ("force", "%")}
-_CELLS, _EDGES = "cells in the radius", (4, 8, 12, 20)
-
-# Tables with a line for every row of a part: the part, and its columns.
+# Tables with a line for every row of a part: by name, and by part if it has another name.
 _BY_ROW = {
-    "jump_off": ("pull_off", _GRID | {"jump_off_cells": (_CELLS, "g"), "jump_off_approach": ("approach", ".4g")}),
-    "jump_in": ("jump_in", _GRID | {"range": ("range", "g")} | _JUMP_IN | _ERRORS),
-    "punches": (
-        "punches",
-        {"square": ("square (1) or round (0)", "g"), "cells": ("radius in cells", "g"), "pull_off": ("pull-off", ".4g")}
-        | {"pull_off_of_nodes": ("pull-off by nodes", ".4g"), "compliance": ("compliance", ".4g")},
-    ),
-    "strips": (
-        "strips",
-        _GRID
-        | {"cells": ("half-width in cells", "g"), "pull_off_error": ("pull-off", "%")}
-        | {"compliance_error": ("compliance", "%")},
-    ),
-    "wave": ("sinusoid", _WAVE),
-    "crack": (
-        "crack",
-        _GRID
-        | {"radius": ("c/L", "g"), "cells": ("radius in cells", ".3g"), "radius_error": ("radius", "%")}
-        | {"pressure_error": ("pressure", "%")},
-    ),
-    "pair": (
-        "pair",
-        _GRID | {"approach": ("approach", "g"), "spots": ("patches", "g"), "asymmetry": ("asymmetry", ".2g")} | _ERRORS,
-    ),
-    "loops": ("loops", _LOOP),
+    "jump_off pull_off": "grid: grid g; jump_off_cells: cells in the radius g; jump_off_approach: approach .4g",
+    "jump_in": """grid: grid g; range: range g; approach: approach .6g; approach_exact: Wu .6g;
+        spots_before: spots before g; spots_after: after g; area_error: area %; force_error: force %""",
+    "punches": """square: square (1) or round (0) g; cells: radius in cells g; pull_off: pull-off .4g;
+        pull_off_of_nodes: pull-off by nodes .4g; compliance: compliance .4g""",
+    "strips": "grid: grid g; cells: half-width in cells g; pull_off_error: pull-off %; compliance_error: compliance %",
+    "wave sinusoid": """alpha: α g; grid: grid g; psi: ψ g; cells: half-width in cells .3g; width_error: width %;
+        pressure: p/p\\* .4g; pressure_exact: exact .4g; pressure_error: pressure %; energy_error: energy %""",
+    "crack": """grid: grid g; radius: c/L g; cells: radius in cells .3g; radius_error: radius %;
+        pressure_error: pressure %""",
+    "pair": """grid: grid g; approach: approach g; spots: patches g; asymmetry: asymmetry .2g; area_error: area %;
+        force_error: force %""",
+    "loops": """with: adhesion s; step: longest step/h_rms g; steps: equilibria g; largest_work: largest work .4g;
+        work: work of the loop .2e; jump_in: jumps in .2e; jump_off: jumps off .2e;
+        coalescence: merging and splitting .2e; unattributed: no event .2e; not_closed: imbalance .2e""",
 }
+_SAME = """what: the same state s; pressure_error: load .2g; area_error: area .2g;
+    fraction_error: largest difference of a cell .2g"""
+_EDGES = (4, 8, 12, 20)
 
 
 def tables(rows: Rows) -> dict[str, Table]:
@@ -242,8 +220,8 @@ def tables(rows: Rows) -> dict[str, Table]:
         "ellipse": turned(rows["ellipse"]),
         "ranges": towards_zero(rows["ranges"]),
         "cells": by_grid(rows["cells"]),
-        "symmetry": by([*rows["symmetry"], *in_fewer_steps], {"what": ("the same state", "s")} | _SAME),
-        **{name: by(rows[part], columns) for name, (part, columns) in _BY_ROW.items()},
+        "symmetry": by([*rows["symmetry"], *in_fewer_steps], _SAME),
+        **{name.split()[0]: by(rows[name.split()[-1]], columns) for name, columns in _BY_ROW.items()},
     }
     return {f"short_range_{name}": table for name, table in found.items()}
 

@@ -56,17 +56,23 @@ def means(values: Sequence[np.ndarray], form: str) -> list[str]:
     return [f"{mean} ± {form.replace('+', '').format(d)}" for mean, d in zip(found, deviation, strict=True)]
 
 
-def by(rows: Sequence[Mapping], columns: Mapping[str, tuple[str, str]]) -> Table:
-    """Table with a line for each row; columns give heading and format, `%` for errors in per cent.
+def by(rows: Sequence[Mapping], columns: str) -> Table:
+    """Table with a line for each row that has all columns.
 
     A line that repeats an earlier one, such as a state of loading and of unloading, is left out.
+
+    Parameters
+    ----------
+    columns : `name: heading format` of each column, such as "area_error: area %"; `%` formats errors in per cent.
     """
 
     def written(value, form):
-        return percent(value) if form == "%" else format(value, form)
+        return "" if value is None else percent(value) if form == "%" else format(value, form)
 
-    lines = dict.fromkeys(tuple(written(row[name], form) for name, (_, form) in columns.items()) for row in rows)
-    return Table([heading for heading, _ in columns.values()], [list(line) for line in lines])
+    described = [re.fullmatch(r"\s*(\w+): (.*) (\S+)", each).groups() for each in columns.split(";")]
+    shown = [row for row in rows if all(name in row for name, _, _ in described)]
+    lines = dict.fromkeys(tuple(written(row[name], form) for name, _, form in described) for row in shown)
+    return Table([heading for _, heading, _ in described], [list(line) for line in lines])
 
 
 def worst(rows: Iterable[Mapping], *names: str) -> float:

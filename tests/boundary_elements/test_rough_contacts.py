@@ -94,7 +94,7 @@ def test_load_and_area_hardly_depend_on_the_grid():
 def test_attraction_of_shorter_and_shorter_range_tends_to_the_limit():
     rows = towards_short_range(rough(96, 6, 16), (1.5,), ((800e-9, 1), (400e-9, 1)), 0.5)
     *finite, limit = rows
-    for name in ("pressure", "energetic_area"):
+    for name in ("reduced_pressure", "energetic_area"):
         far, near = (abs(row[name] - limit[name]) for row in finite)
         assert near < far
 
