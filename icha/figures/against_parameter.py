@@ -562,18 +562,23 @@ def work_of_adhesion(
         colour, means = colours[contact] if contact else COLOURS[k], []
         for group in (each.runs for each in series if each.contact == contact):
             unit_of_work = _UNITS_OF_WORK.get(quantity)
-            runs = [run for run in group.by_seed.values() if quantity in run]
-            units = [float(run[unit_of_work]) if unit_of_work else 1.0 for run in runs]
-            points = [
-                (float(run["rms_height"]) * scale, float(run[quantity]) / unit)
-                for run, unit in zip(runs, units, strict=True)
-            ]
+            points = {
+                seed: (
+                    float(run["rms_height"]) * scale,
+                    float(run[quantity]) / (float(run[unit_of_work]) if unit_of_work else 1.0),
+                )
+                for seed, run in group.by_seed.items()
+                if quantity in run
+            }
             if points:
-                of_seeds = Name(f"{name}, single seeds", group.labels._replace(seed=None))
-                plot(ax, *np.transpose(points), of_seeds, marker=marker, mec=colour, **_ONE_SEED)
-                means.append(np.mean(points, axis=0))
+                for seed, (x, y) in points.items():
+                    record(ax, [x], [y], Name(f"{name}, single seeds", group.labels._replace(seed=seed)))
+                ax.plot(*np.transpose([*points.values()]), marker=marker, mec=colour, **_ONE_SEED)
+                x, y = np.mean([*points.values()], axis=0)
+                record(ax, [x], [y], Name(f"{name}, mean", group.labels._replace(seed=None)), seeds=len(points))
+                means.append((x, y))
         if means:
-            plot(ax, *np.transpose(means), f"{name}, mean", marker=marker, color=colour, **_MEAN)
+            ax.plot(*np.transpose(means), marker=marker, color=colour, **_MEAN)
             handles[name] = legend_handle(color=GREY if contact else colour, marker=marker, **_MEAN)
     markers = itertools.cycle(CROSSES)
     for each in read_measured(fig, tables, measurements, "rms_height", any_of=_MEASURED_WORKS):

@@ -55,7 +55,7 @@ LAWS = {
     "boundary_elements, loop": PowerLaw(5.5e-4, {"nodes": 1.0}),
     "boundary_elements": PowerLaw(2.6e-7, {"nodes": 1.22, "stops": 0.49}),
     "boundary_elements, adhesion": PowerLaw(1.5e-3, {"nodes": 0.35, "stops": 0.55, "spots": 0.71}),
-    # A loop with adhesion on a free square: eleven of fifteen measured loops were within a factor of 2.1, all within 3.1.
+    # A loop with adhesion on a free square; eleven of fifteen measured loops were within a factor of 2.1.
     "boundary_elements, free loop": PowerLaw(4e-4, {"nodes": 1.05}),
 }
 # Time of a loop of asperities with adhesion, divided by the time without: each jump of a spot takes several steps.
