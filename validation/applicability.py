@@ -156,20 +156,12 @@ def press(surface: Surface, material: Material, model: str, largest: float = LOA
 
 def states(run: xr.Dataset) -> dict[float, State]:
     """Return the states of a run by reduced pressure."""
-    spacing = float(run["period"]) / int(run["grid"])
-    of_step = {
-        float(load): (float(area), float(gap))
-        for load, area, gap in zip(
-            run["step_target"].values,
-            run["contact_area_fraction"].values,
-            run["mean_gap"].values / float(run["rms_height"]),
-            strict=True,
-        )
-    }
-    found = {}
+    found, at_snapshots = {}, run.isel(step=run["snapshot_step"].values)
+    gaps = at_snapshots["mean_gap"].values / float(run["rms_height"])
     for at, load in enumerate(run["snapshot_target"].values):
         radii = run["spot_radius"].values[run["spot_snapshot"].values == at]
-        found[float(load)] = State(*of_step[float(load)], float(np.average(radii, weights=radii**2) / spacing))
+        cells = float(np.average(radii, weights=radii**2) / (run["period"] / run["grid"]))
+        found[float(load)] = State(float(at_snapshots["contact_area_fraction"][at]), float(gaps[at]), cells)
     return found
 
 

@@ -13,6 +13,7 @@ from functools import partial
 from itertools import product
 
 import numpy as np
+import pandas as pd
 
 from validation import rough_contacts as rough
 from validation import single_contacts as single
@@ -57,11 +58,6 @@ PARTS: Parts = {
 # --- errors -------------------------------------------------------------------------------------------------------
 
 
-def _within(rows: list[dict], low: float, high: float) -> list[dict]:
-    """Return the rows with a contact radius from `low` to less than `high` cells."""
-    return [row for row in rows if low <= row["cells"] < high]
-
-
 def bounds(rows: Rows) -> Table:
     """Table of all targets with the measured errors."""
     lines = []
@@ -77,22 +73,13 @@ def bounds(rows: Rows) -> Table:
         ("approach under given load", "load", "approach_error"),
         ("pull-off", "pull_off", "pull_off_error"),
     )
-    for low, high, bound in ((4, 8, 0.025), (8, math.inf, 0.01)):
-        cells = f"{low} to {high} cells" if math.isfinite(high) else f"{low} cells and more"
-        for symmetric, place in ((False, "elsewhere in a cell"), (True, "with the symmetry of the grid")):
-            for what, part, name in targets:
-                rows_at_place = [
-                    row
-                    for row in _within(rows[part], low, high)
-                    if all(shift in (0.0, 0.5) for shift in row["offset"]) == symmetric
-                ]
-                share = sum(abs(row[name]) <= bound for row in rows_at_place) / len(rows_at_place)
-                add(
-                    f"sphere of {cells}, centre {place}: {what}",
-                    worst(rows_at_place, name),
-                    bound,
-                    f"{100 * share:.0f} %",
-                )
+    ranges = (("4 to 8 cells", 4, 8, 0.025), ("8 cells and more", 8, math.inf, 0.01))
+    places = (("elsewhere in a cell", False), ("with the symmetry of the grid", True))
+    for (cells, low, high, bound), (place, symmetric), (what, part, name) in product(ranges, places, targets):
+        members = [row for row in rows[part] if low <= row["cells"] < high]
+        members = [row for row in members if (set(row["offset"]) <= {0.0, 0.5}) == symmetric]
+        share = f"{100 * sum(abs(row[name]) <= bound for row in members) / len(members):.0f} %"
+        add(f"sphere of {cells}, centre {place}: {what}", worst(members, name), bound, share)
     add("turned elliptic paraboloids, short axis of 8 cells and more", _turned_error(rows["ellipse"]), 0.01)
     add("without adhesion, mean gap against Tamaas", worst(rows["tamaas"], "separation_error"), 1e-4)
     add("without adhesion, gap everywhere (rms, over h_rms)", worst(rows["tamaas"], "gap_error"), 1e-3)
@@ -124,35 +111,31 @@ def convergence(rows: list[dict]) -> Table:
 
 def turned(rows: list[dict]) -> Table:
     """Table of areas, forces and pull-off of elliptic paraboloids, relative to the mean of the finest grid."""
-    approaches = sorted({row["approach"] for row in rows}, reverse=True)
-    lines = []
-    for grid, angle in sorted({(row["grid"], row["angle"]) for row in rows}):
-        by_approach = {row["approach"]: row for row in rows if (row["grid"], row["angle"]) == (grid, angle)}
-        cells = [
-            " / ".join(percent(_over_finest(rows, by_approach[approach], name)) for name in ("area", "force"))
-            for approach in approaches
-        ]
-        cells.append(percent(_over_finest(rows, by_approach[approaches[-1]], "pull_off")))
-        lines.append([f"{grid}²", f"{angle:g}°", *cells])
-    head = [f"approach {approach:g}: area / force" for approach in approaches]
+    errors, lines = _over_finest(rows).sort_values("approach", ascending=False), []
+    for (grid, angle), group in errors.groupby(["grid", "angle"]):
+        pairs = zip(group["area_error"], group["force_error"], strict=True)
+        cells = [" / ".join(map(percent, pair)) for pair in pairs]
+        lines.append([f"{grid}²", f"{angle:g}°", *cells, percent(group["pull_off_error"].iloc[-1])])
+    head = [f"approach {approach:g}: area / force" for approach in errors["approach"].unique()]
     return Table(["grid", "angle", *head, "pull-off"], lines)
 
 
-def _over_finest(rows, row, name):
-    finest = max(other["grid"] for other in rows)
-    wanted = np.mean([r[name] for r in rows if r["grid"] == finest and r["approach"] == row["approach"]])
+def _over_finest(rows):
+    """Return the rows with errors of area, force and pull-off, relative to the mean of the finest grid."""
+    rows, names = pd.DataFrame(rows), ["area", "force", "pull_off"]
+    means = rows[rows["grid"] == rows["grid"].max()].groupby("approach")[names].mean()
+    wanted = means.loc[rows["approach"]].set_axis(rows.index)
     # Forces change sign, so their error is over the pull-off force if that is larger.
-    unit = max(abs(wanted), row["pull_off"]) if name == "force" else wanted
-    return float((row[name] - wanted) / unit)
+    unit = wanted.assign(force=np.maximum(wanted["force"].abs(), rows["pull_off"]))
+    return rows.join(((rows[names] - wanted) / unit).add_suffix("_error"))
 
 
 def _turned_error(rows):
     """Return the largest error of area and force of paraboloids whose short axis has at least 8 cells."""
-    finest = max(row["grid"] for row in rows)
-    resolved = [
-        row for row in rows if row["grid"] < finest and math.sqrt(row["area"] / math.pi) / row["spacing"] / 2**0.25 >= 8
-    ]
-    return max(abs(_over_finest(rows, row, name)) for row in resolved for name in ("area", "force"))
+    errors = _over_finest(rows)
+    cells = np.sqrt(errors["area"] / math.pi) / errors["spacing"] / 2**0.25
+    resolved = errors[(errors["grid"] < errors["grid"].max()) & (cells >= 8)]
+    return resolved[["area_error", "force_error"]].abs().to_numpy().max()
 
 
 def by_grid(rows: list[dict]) -> Table:

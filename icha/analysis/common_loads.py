@@ -1,6 +1,5 @@
 """Compare contact areas and mean separations of the runs of a study at common loads, with means and scatter."""
 
-import warnings
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -169,7 +168,8 @@ def _spreads(on_grid, averaged, asked):
             "1",
             f"largest A/A0 of all {many} divided by the smallest, minus 1",
         )
-        spread = _spread(on_grid["contact_area_fraction"], LABELS.index(label))
+        area, axis = on_grid["contact_area_fraction"], LABELS.index(label)
+        spread = np.fmax.reduce(area, axis) / np.fmin.reduce(area, axis) - 1
         found[f"{label.removeprefix('rms_')}_spread"] = description, spread
     return found
 
@@ -198,13 +198,6 @@ def at_common_loads(
     if not len(at):
         return at, np.empty((len(curves), 0))
     return at, np.array([interpolate(load, values, at, logarithmic=logarithmic) for load, values in curves])
-
-
-def _spread(area, axis):
-    """Return the ratio of the largest to the smallest area along an axis, minus 1; NaN if no run is complete."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)
-        return np.nanmax(area, axis) / np.nanmin(area, axis) - 1
 
 
 def _common_grid(loads):
