@@ -22,14 +22,17 @@ from validation.tables import Table, write_tables
 
 RESULTS = Path(__file__).resolve().parent / "results/jkr_test.json"
 TESTS, POINTS, NOISE = 200, 50, 0.02
-# Measured columns, whether the offset of the indentation is known, and whether the noise is a share of each value
-# instead of a share of the largest value.
+# Measured columns, whether the offset of the indentation is known, whether the noise is a share of each value instead
+# of a share of the largest value, and the range of the load divided by the pull-off force.
 CASES = {
-    "contact radius": (["contact_radius"], True, False),
-    "contact radius, noise a share of each value": (["contact_radius"], True, True),
-    "indentation": (["indentation"], True, False),
-    "indentation, unknown zero": (["indentation"], False, False),
-    "both, unknown zero": (["contact_radius", "indentation"], False, False),
+    "contact radius": (["contact_radius"], True, False, (1, 10)),
+    "contact radius, noise a share of each value": (["contact_radius"], True, True, (1, 10)),
+    "indentation": (["indentation"], True, False, (1, 10)),
+    "indentation, unknown zero": (["indentation"], False, False, (1, 10)),
+    "both, unknown zero": (["contact_radius", "indentation"], False, False, (1, 10)),
+    "contact radius, load 20": (["contact_radius"], True, False, (20, 20)),
+    "indentation, load 20": (["indentation"], True, False, (20, 20)),
+    "indentation, unknown zero, load 20": (["indentation"], False, False, (20, 20)),
 }
 QUANTITIES = {"contact_modulus": "*E\\**", "advancing_work": "advancing Δγ", "receding_work": "receding Δγ"}
 
@@ -70,29 +73,29 @@ def noisy_test(exact: Mapping[str, np.ndarray], rng, columns, offset=0.0, *, by_
     return found
 
 
-def random_truth(rng) -> dict[str, float]:
-    """Return the parameters of a random test; its load is 1 to 10 times the pull-off force."""
+def random_truth(rng, loads: tuple[float, float]) -> dict[str, float]:
+    """Return the parameters of a random test; `loads`: range of the load divided by the pull-off force."""
     radius, modulus = 10 ** rng.uniform(-3, -2), 10 ** rng.uniform(5.5, 6.5)
     advancing = rng.uniform(0.02, 0.06)
     receding = advancing * rng.uniform(1.2, 4)
-    load = rng.uniform(1, 10) * 1.5 * np.pi * receding * radius
+    load = rng.uniform(*loads) * 1.5 * np.pi * receding * radius
     return {"radius": radius, "modulus": modulus, "advancing": advancing, "receding": receding, "load": load}
 
 
 def measure(tests: int) -> list[dict]:
     """Return, for each case, how often each interval contains the truth, and the median width of the intervals."""
     rows = []
-    for case, (columns, known, by_value) in CASES.items():
+    for case, (columns, known, by_value, loads) in CASES.items():
         inside, widths = {name: [] for name in QUANTITIES}, {name: [] for name in QUANTITIES}
         rng = np.random.default_rng(1)
-        for number in range(tests):
-            truth = random_truth(rng)
+        for _ in range(tests):
+            truth = random_truth(rng, loads)
             exact = exact_test(**truth)
             offset = 0.0 if known else 0.3 * float(exact["indentation"].max())
             table = noisy_test(exact, rng, columns, offset, by_value=by_value)
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", icha.IchaWarning)
-                test = icha.fit_jkr_test(table, truth["radius"], indentation_offset=0.0 if known else None, seed=number)
+                test = icha.fit_jkr_test(table, truth["radius"], indentation_offset=0.0 if known else None)
             true = {"contact_modulus": truth["modulus"]}
             true |= {"advancing_work": truth["advancing"], "receding_work": truth["receding"]}
             for name, value in true.items():

@@ -144,8 +144,7 @@ def conformal_sphere(energy: float, seed: int, grid: int = 128) -> dict:
     row = {"energy": energy, "rms_height": surface.rms_height, "expected": 1 - energy}
     for branch, part in (("loading", loading), ("unloading", unloading)):
         for name, values in (("contact_radius", np.sqrt(area / math.pi)), ("indentation", -run.mean_separation.values)):
-            fit = fit_work_of_adhesion(force[part], 1.0, contact_modulus=1.0, **{name: values[part]})
-            row[f"{branch}_{name}"] = fit.work_of_adhesion
+            row[f"{branch}_{name}"] = fit_work_of_adhesion(force[part], 1.0, 1.0, **{name: values[part]})
         # The work of adhesion of the law at force and radius of each state, 0.5 to 1 times the largest radius.
         a = np.sqrt(area[part] / math.pi)
         wide = a > 0.5 * a.max()

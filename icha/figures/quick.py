@@ -92,8 +92,9 @@ def plot_jkr_test(test: JKRTest) -> Figure:
             label = f"{use} ({count})" if use in _LOOKS else f"left out: {use} ({count})"
             for axes, values in ((top, force), (middle, force_residual), (bottom, residual)):
                 axes.plot(x[members], values[members], label=label, **look)
-        for use, states in test.curves().items():
-            top.plot(getattr(states, name) * per_metre, states.force * per_newton, color=_LOOKS[use]["color"], lw=1)
+        for use, states in test.loop.curves(test.radius).items():
+            if use in test.counts:
+                top.plot(getattr(states, name) * per_metre, states.force * per_newton, color=_LOOKS[use]["color"], lw=1)
         top.set_ylabel(f"force  ({force_unit})")
         middle.set_ylabel(f"residual  ({force_unit})")
         bottom.set(xlabel=f"{name.replace('_', ' ')}  ({unit})", ylabel=f"residual  ({unit})")

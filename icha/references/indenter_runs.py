@@ -129,10 +129,10 @@ def apparent_work_of_adhesion(states: Sequence[Mapping[str, float]], radius: flo
     if len(chosen) < _LEAST_STATES:
         raise NoFit(f"fewer than {_LEAST_STATES} states")
     force, contact_radius = (np.array([states[k][name] for k in chosen]) for name in ("force", "contact_radius"))
-    fit = fit_work_of_adhesion(force, radius, contact_radius=contact_radius, contact_modulus=material.contact_modulus)
-    if not fit.work_of_adhesion:
+    work = fit_work_of_adhesion(force, radius, material.contact_modulus, contact_radius=contact_radius)
+    if not work:
         raise NoFit("Hertz fits better")
-    return fit.work_of_adhesion
+    return work
 
 
 def reason_without_fit(run: xr.Dataset, branch: str) -> str:

@@ -7,48 +7,34 @@ Maugis and M. Barquins, J. Phys. D: Appl. Phys. 11 (1978) 1989, doi:10.1088/0022
 
 All measured quantities have errors, so a fit minimises the squared distances between points and curves, each quantity
 divided by its error (P. T. Boggs, R. H. Byrd and R. B. Schnabel, SIAM J. Sci. Stat. Comput. 8 (1987) 1052,
-doi:10.1137/0908085). Intervals come from fits to points with residuals of random sign, the wild bootstrap (C. F. J. Wu,
-Ann. Stat. 14 (1986) 1261, doi:10.1214/aos/1176350142), because the errors of points may differ.
+doi:10.1137/0908085). Intervals are those of the linear approximation at the fit, with Student's t.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import least_squares
+from scipy.spatial import KDTree
+from scipy.stats import t as student
 
-from icha.references.indentation import (
-    ContactState,
-    punch_force,
-    sphere_contact,
-    sphere_jump_off,
-    sphere_radius_at_force,
-)
+from icha.references.indentation import ContactState, sphere_contact, sphere_radius_at_force
 
-# Branches of the loop.
-LOADING, STUCK, RECEDING = 0, 1, 2
-# Smallest number of points that determine a work of adhesion.
-LEAST_POINTS = 3
-# States of each branch among which the nearest one is searched first, and the largest radius among them, divided by
-# that of the turning point. The smallest radius is not below this share of the radius at the turning point.
-_STATES, _BEYOND, _SMALLEST = 300, 1.3, 1e-3
-# Factors of the first guesses of contact modulus and receding work, and the ratio of advancing to receding work.
+# States of a branch, and the smallest contact radius among them, divided by that of the turning point.
+_STATES, _SMALLEST = 400, 1e-3
+# First guesses: modulus and receding work in units of the points, and the ratio of advancing to receding work.
 _GUESSES = (0.5, 1.0, 2.0), (1.0, 3.0), (0.03, 0.3, 1.0)
-# Number of guesses that are refined, and of assignments of points to branches.
-_REFINED, _ASSIGNMENTS = 3, 20
-# Number of steps of a fit: of a guess, of the best guess, and of a resample.
-_FIRST_STEPS, _STEPS, _RESAMPLE_STEPS = 6, 60, 10
-# Step of numerical derivatives; smallest relative decrease of the sum of squares; largest damping.
-_DIFFERENCE, _GAIN, _DAMPING = 1e-6, 1e-12, 1e8
-# Largest number of points of all resamples that are fitted together, which limits the memory.
-_TOGETHER = 200_000
+# Number of guesses that are refined; relative decrease and step at which a fit ends, far below the noise of tests.
+_REFINED, _CONVERGENCE = 3, {"ftol": 1e-6, "xtol": 1e-6}
+# Step of numerical derivatives, not much narrower than the distance between states.
+_STEP = 1e-3
 
 
 class Loop(NamedTuple):
-    """Parameters of a loop; single numbers or arrays.
+    """Parameters of a loop.
 
     Attributes
     ----------
@@ -58,171 +44,26 @@ class Loop(NamedTuple):
     offset : indentation of the instrument where the sphere touches the undeformed plane, m.
     """
 
-    contact_modulus: np.ndarray | float
-    advancing_work: np.ndarray | float
-    receding_work: np.ndarray | float
-    stuck_radius: np.ndarray | float
-    offset: np.ndarray | float
+    contact_modulus: float
+    advancing_work: float
+    receding_work: float
+    stuck_radius: float
+    offset: float
 
-    def state(self, radius, branch, contact_radius, withdrawal) -> ContactState:
-        """Return the states of a sphere with this radius, m.
+    def curves(self, radius: float) -> dict[str, ContactState]:
+        """Return the states of a sphere by branch: from the touch to the turning point, stuck, and to jump-off."""
 
-        Parameters
-        ----------
-        branch : LOADING, STUCK or RECEDING.
-        contact_radius : m; for stuck contacts `stuck_radius`.
-        withdrawal : distance from the turning point, m; 0 for other than stuck contacts.
-        """
-        work = np.where(branch == RECEDING, self.receding_work, self.advancing_work)
-        found = sphere_contact(contact_radius, radius, self.contact_modulus, work)
-        force = found.force - punch_force(withdrawal, contact_radius, self.contact_modulus)
-        return ContactState(found.contact_radius, found.indentation - withdrawal + self.offset, force)
-
-    def trace(self, radius, branch, beyond=1.0) -> tuple[np.ndarray, np.ndarray]:
-        """Return contact radii and withdrawals along a branch; loading ends at `beyond` times the stuck radius."""
-        top = self.stuck_radius
-        if branch == STUCK:
-            advancing, receding = (
-                sphere_contact(top, radius, self.contact_modulus, work).indentation
-                for work in (self.advancing_work, self.receding_work)
+        def equilibria(work, factor):
+            least = max(np.cbrt(factor * np.pi * work * radius**2 / self.contact_modulus), _SMALLEST * largest)
+            return sphere_contact(
+                np.linspace(min(least, largest), largest, _STATES), radius, self.contact_modulus, work
             )
-            withdrawal = np.linspace(0.0, max(float(advancing - receding), 0.0), _STATES)
-            return np.full(_STATES, float(top)), withdrawal
-        work = self.receding_work if branch == RECEDING else self.advancing_work
-        least = max(float(sphere_jump_off(radius, self.contact_modulus, work).contact_radius), _SMALLEST * top)
-        largest = top * (beyond if branch == LOADING else 1.0)
-        return np.geomspace(min(least, largest), largest, _STATES), np.zeros(_STATES)
 
-
-class LoopFit(NamedTuple):
-    """Fit of a loop to points.
-
-    Attributes
-    ----------
-    loop : fitted loop.
-    branch : (n,) int, branch of each point.
-    states : (n,) nearest state of the loop to each point.
-    resampled : loops of the resamples, arrays.
-    """
-
-    loop: Loop
-    branch: np.ndarray
-    states: ContactState
-    resampled: Loop
-
-
-@dataclass(frozen=True)
-class _Problem:
-    """Points and units of a fit. Arrays have the axes resample, point, quantity.
-
-    Unknowns are the logarithms of modulus and stuck radius, the roots of the works of adhesion, and the offset, in
-    units that the points give. Each point has one more unknown, its place on the curve: the logarithm of the contact
-    radius or, for stuck contacts, the withdrawal.
-    """
-
-    radius: float
-    names: tuple[str, ...]
-    errors: np.ndarray
-    modulus: float
-    size: float
-
-    @property
-    def work(self) -> float:
-        """Unit of works of adhesion, J/m^2: Hertz's force at the contact radius `size` is the pull-off force."""
-        return 4 / 3 * self.modulus * self.size**3 / self.radius / (1.5 * math.pi * self.radius)
-
-    @property
-    def depth(self) -> float:
-        """Unit of indentations, m: Hertz's indentation at the contact radius `size`."""
-        return self.size**2 / self.radius
-
-    def loop(self, unknown) -> Loop:
-        """Return the loops of unknowns with the shape (resample, 5), as columns."""
-        modulus, advancing, receding, size, offset = np.moveaxis(np.asarray(unknown), -1, 0)[..., None]
-        works = self.work * advancing**2, self.work * receding**2
-        return Loop(self.modulus * np.exp(modulus), *works, self.size * np.exp(size), self.depth * offset)
-
-    def unknown(self, loop: Loop) -> np.ndarray:
-        """Return the unknowns of a loop."""
-        logarithms = math.log(loop.contact_modulus / self.modulus), math.log(loop.stuck_radius / self.size)
-        roots = math.sqrt(loop.advancing_work / self.work), math.sqrt(loop.receding_work / self.work)
-        return np.array([logarithms[0], *roots, logarithms[1], loop.offset / self.depth])
-
-    def states(self, unknown, place, branch) -> ContactState:
-        """Return the states at places on the curves."""
-        loop = self.loop(unknown)
-        stuck = branch == STUCK
-        contact_radius = np.where(stuck, loop.stuck_radius, self.size * np.exp(np.where(stuck, 0.0, place)))
-        withdrawal = np.where(stuck, place * self.depth, 0.0)
-        return loop.state(self.radius, branch, contact_radius, withdrawal)
-
-    def scaled(self, state: ContactState) -> np.ndarray:
-        """Return the measured quantities of states, divided by their errors."""
-        return np.stack([getattr(state, name) for name in self.names], axis=-1) / self.errors
-
-    def nearest(self, loop: Loop, data, unloading) -> tuple[np.ndarray, np.ndarray, float]:
-        """Return the branch of each point, its place on the curve, and the sum of squared distances."""
-        branch, place = np.zeros(len(data), int), np.zeros(len(data))
-        least = np.full(len(data), np.inf)
-        for each in (LOADING, STUCK, RECEDING):
-            radii, withdrawals = loop.trace(self.radius, each, _BEYOND)
-            curve = self.scaled(loop.state(self.radius, np.array(each), radii, withdrawals))
-            candidates = np.flatnonzero(unloading == (each != LOADING))
-            squares = ((data[candidates, None] - curve) ** 2).sum(axis=-1)
-            best = squares.argmin(axis=1)
-            squares = squares.min(axis=1)
-            closer = squares < least[candidates]
-            members, best = candidates[closer], best[closer]
-            least[members], branch[members] = squares[closer], each
-            place[members] = withdrawals[best] / self.depth if each == STUCK else np.log(radii[best] / self.size)
-        return branch, place, float(least.sum())
-
-    def derivatives(self, unknown, place, branch, free):
-        """Return the scaled states, and their derivatives by the places and by the free unknowns."""
-        value = self.scaled(self.states(unknown, place, branch))
-        by_place = (self.scaled(self.states(unknown, place + _DIFFERENCE, branch)) - value) / _DIFFERENCE
-        by_unknown = []
-        for k in free:
-            step = np.zeros(5)
-            step[k] = _DIFFERENCE
-            by_unknown.append((self.scaled(self.states(unknown + step, place, branch)) - value) / _DIFFERENCE)
-        return value, by_place, np.stack(by_unknown, axis=-1)
-
-    def across(self, by_place, by_unknown):
-        """Return the derivatives of the distances: the part of `by_unknown` that is normal to the curves."""
-        square = (by_place**2).sum(axis=-1)
-        along = np.einsum("bnm,bnmk->bnk", by_place, by_unknown) / square[..., None]
-        return square, along, by_unknown - by_place[..., None] * along[:, :, None]
-
-    def minimise(self, data, unknown, place, branch, free, steps=_STEPS):
-        """Return unknowns and places of the smallest squared distances, and the sums of squares, for all resamples.
-
-        A step of Levenberg and Marquardt eliminates the places of the points exactly.
-        """
-        damping = np.full(len(data), 1e-3)
-        cost = ((data - self.scaled(self.states(unknown, place, branch))) ** 2).sum(axis=(1, 2))
-        done = np.zeros(len(data), bool)
-        for _ in range(steps):
-            value, by_place, by_unknown = self.derivatives(unknown, place, branch, free)
-            residual = data - value
-            square, along, normal = self.across(by_place, by_unknown)
-            matrix = np.einsum("bnmk,bnml->bkl", normal, normal)
-            diagonal = np.einsum("bkk->bk", matrix)
-            diagonal += damping[:, None] * diagonal + 1e-14 * diagonal.max(axis=1, keepdims=True)
-            step = np.linalg.solve(matrix, np.einsum("bnmk,bnm->bk", normal, residual)[..., None])[..., 0]
-            shift = np.einsum("bnm,bnm->bn", by_place, residual) / square - np.einsum("bnk,bk->bn", along, step)
-            trial, moved = unknown.copy(), place + np.clip(shift, -1, 1)
-            trial[:, free] += np.clip(step, -1, 1)
-            with np.errstate(over="ignore", invalid="ignore"):
-                new = ((data - self.scaled(self.states(trial, moved, branch))) ** 2).sum(axis=(1, 2))
-            better = (new < cost) & ~done
-            done |= (damping > _DAMPING) | (better & (cost - new <= _GAIN * cost))
-            unknown, place = np.where(better[:, None], trial, unknown), np.where(better[:, None], moved, place)
-            cost = np.where(better, new, cost)
-            damping = np.where(better, damping / 10, damping * 10)
-            if done.all():
-                break
-        return unknown, place, cost
+        largest = self.stuck_radius
+        loading, receding = equilibria(self.advancing_work, 2.0), equilibria(self.receding_work, 1 / 8)
+        stuck = np.linspace(np.transpose(loading)[-1], np.transpose(receding)[-1], _STATES, endpoint=False)
+        branches = {"loading": np.array(loading), "stuck": stuck.T, "receding": np.array(receding)[:, ::-1]}
+        return {name: ContactState(a, depth + self.offset, force) for name, (a, depth, force) in branches.items()}
 
 
 def fit_loop(
@@ -230,11 +71,9 @@ def fit_loop(
     unloading: np.ndarray,
     errors: dict[str, float],
     radius: float,
-    *,
-    fit_offset: bool,
-    resamples: int,
-    seed: int,
-) -> LoopFit:
+    offset: float | None,
+    probability: float,
+) -> tuple[list[Loop], np.ndarray, np.ndarray]:
     """Fit a loop to measured points.
 
     Parameters
@@ -243,66 +82,67 @@ def fit_loop(
     unloading : (n,) bool, True for points of unloading.
     errors : standard deviation of each quantity; only their ratios have an effect.
     radius : radius of the sphere, m.
-    fit_offset : whether the offset of the indentation is an unknown; otherwise it is 0.
-    resamples, seed : number of fits for the intervals, and seed of the random signs.
+    offset : offset of the indentation, m; None to fit it.
+    probability : that an interval contains the true value.
+
+    Returns
+    -------
+    Fitted loop, and loops with the lower and the upper ends of the intervals; the nearest state of the fitted loop to
+    each point, (quantity, n); the branch of this state, (n,) text.
     """
-    force = points["force"]
-    top = int(np.argmax(force))
-    if "contact_radius" in points:
-        size = float(points["contact_radius"].max())
-    else:
-        size = math.sqrt(radius * float(np.ptp(points["indentation"])))
-    modulus = 0.75 * float(force[top]) * radius / size**3
-    problem = _Problem(radius, tuple(points), np.array([errors[name] for name in points]), modulus, size)
-    data = np.stack(list(points.values()), axis=-1) / problem.errors
-    guesses = []
-    pull_off = max(-float(force.min()), 0.02 * float(force[top])) / (1.5 * math.pi * radius)
+    force, scales = points["force"], np.array([errors[name] for name in points])
+    data, top, unloads = np.stack(list(points.values()), axis=-1) / scales, int(np.argmax(force)), bool(unloading.any())
+    depth = np.ptp(points["indentation"]) if "indentation" in points else points["contact_radius"].max() ** 2 / radius
+    modulus, work = 0.75 * force[top] * radius / (depth * radius) ** 1.5, force[top] / (1.5 * np.pi * radius)
+
+    def loop_of(unknown):
+        # The law is smooth in the roots of the works of adhesion.
+        fitted, advancing, receding = modulus * math.exp(unknown[0]), work * unknown[1] ** 2, work * unknown[2] ** 2
+        turn = float(sphere_radius_at_force(force[top], radius, fitted, advancing)) * math.exp(unknown[3] * unloads)
+        return Loop(fitted, advancing, receding, turn, depth * unknown[4] if offset is None else offset)
+
+    def project(loop):
+        curves, near, branch = loop.curves(radius), np.empty_like(data), np.empty(len(data), object)
+        for members, names in ((~unloading, ["loading"]), (unloading, ["stuck", "receding"])):
+            if members.any():
+                curve = np.concatenate([np.stack([getattr(curves[b], q) for q in points], axis=-1) for b in names])
+                near[members], side = _nearest(data[members], curve / scales)
+                branch[members] = np.repeat(names, _STATES)[side]
+        return near, branch
+
+    def residuals(unknown):
+        return (data - project(loop_of(unknown))[0]).ravel()
+
+    def derivatives(unknown):
+        return np.stack([residuals(unknown + s) - residuals(unknown - s) for s in _STEP * np.eye(5)], -1) / (2 * _STEP)
+
+    guesses, pull_off = [], max(-force.min() / force[top], 0.02)
     for factor, receding, ratio in itertools.product(*_GUESSES):
-        works = ratio * receding * pull_off, receding * pull_off
-        turn = float(sphere_radius_at_force(force[top], radius, factor * modulus, works[0]))
-        depth = float(sphere_contact(turn, radius, factor * modulus, works[0]).indentation)
-        loop = Loop(factor * modulus, *works, turn, float(points["indentation"][top]) - depth if fit_offset else 0.0)
-        guesses.append((problem.nearest(loop, data, unloading)[2], loop))
-    guesses.sort(key=lambda guess: guess[0])
-    fits = [_refine(problem, loop, data, unloading, fit_offset, _FIRST_STEPS) for _, loop in guesses[:_REFINED]]
-    _, best, *_ = min(fits, key=lambda fit: fit[0])
-    _, best, unknown, place, branch, free = _refine(problem, best, data, unloading, fit_offset, _STEPS)
-    value, by_place, by_unknown = problem.derivatives(unknown, place, branch, free)
-    _, _, normal = problem.across(by_place, by_unknown)
-    hat = np.linalg.pinv(np.einsum("bnmk,bnml->kl", normal, normal))
-    leverage = np.einsum("bnmk,kl,bnml->n", normal, hat, normal) / (len(points) - 1)
-    # Residuals of points that determine the fit are smaller than the errors.
-    residual = (data - value[0]) / (1 - np.minimum(leverage, 0.9))[:, None]
-    signs = np.random.default_rng(seed).choice([-1.0, 1.0], size=(resamples, len(data), 1))
-    found = []
-    for some in np.array_split(signs, max(1, -(-signs.size // _TOGETHER))):
-        starts = np.repeat(unknown, len(some), axis=0), np.repeat(place, len(some), axis=0)
-        found.append(problem.minimise(value + some * residual, *starts, branch, free, _RESAMPLE_STEPS)[0])
-    resampled = problem.loop(np.concatenate(found))
-    states = problem.states(unknown, place, branch)
-    return LoopFit(
-        best,
-        branch,
-        ContactState(*(np.asarray(each)[0] for each in states)),
-        Loop(*(each[:, 0] for each in resampled)),
-    )
+        roots = math.sqrt(ratio * receding * pull_off), math.sqrt(receding * pull_off)
+        guess = np.array([math.log(factor), *roots, 0.0, 0.0])
+        if "indentation" in points:
+            guess[4] = (points["indentation"][top] - loop_of(guess).curves(radius)["loading"].indentation[-1]) / depth
+        guesses.append(guess)
+    guesses.sort(key=lambda guess: np.sum(residuals(guess) ** 2))
+    fits = [least_squares(residuals, guess, derivatives, **_CONVERGENCE) for guess in guesses[:_REFINED]]
+    fit = min(fits, key=lambda each: each.cost)
+    freedom = data.size - len(data) - np.count_nonzero(fit.jac.any(axis=0))
+    variance = 2 * fit.cost / freedom * (np.linalg.pinv(fit.jac) ** 2).sum(axis=1)
+    width = student.ppf((1 + probability) / 2, freedom) * np.sqrt(variance)
+    roots = np.array([False, True, True, False, False])
+    unknown, least = np.where(roots, np.abs(fit.x), fit.x), np.where(roots, 0.0, -np.inf)
+    loops = [loop_of(np.maximum(unknown + sign * width, least)) for sign in (0, -1, 1)]
+    near, branch = project(loops[0])
+    return loops, (near * scales).T, branch
 
 
-def _refine(problem, loop, data, unloading, fit_offset, steps):
-    """Return the sum of squares, the loop, its unknowns, places and branches, and the free unknowns of a fit."""
-    branch, place, _ = problem.nearest(loop, data, unloading)
-    unknown, seen = problem.unknown(loop)[None], {branch.tobytes()}
-    for _ in range(_ASSIGNMENTS):
-        free = [0, 1]
-        free += [2] if np.sum(branch == RECEDING) else []
-        free += [3] if unloading.any() else []
-        free += [4] if fit_offset else []
-        unknown, place, [cost] = problem.minimise(data[None], unknown, place[None], branch, free, steps)
-        before = branch
-        fitted = Loop(*(float(each[0, 0]) for each in problem.loop(unknown)))
-        branch, nearest, _ = problem.nearest(fitted, data, unloading)
-        if branch.tobytes() in seen:
-            break
-        seen.add(branch.tobytes())
-        place = np.where(branch == before, place[0], nearest)
-    return cost, fitted, unknown, place.reshape(1, -1), before, free
+def _nearest(points, curve):
+    """Return the nearest point of a polygon, whose first and last side have no outer end, and the side, by point."""
+    node = KDTree(curve).query(points)[1]
+    side = np.stack([np.maximum(node - 1, 0), np.minimum(node, len(curve) - 2)])
+    along = curve[side + 1] - curve[side]
+    share = ((points - curve[side]) * along).sum(-1) / np.maximum((along**2).sum(-1), np.finfo(float).tiny)
+    share = np.clip(share, np.where(side == 0, -np.inf, 0), np.where(side == len(curve) - 2, np.inf, 1))
+    near = curve[side] + share[..., None] * along
+    closer = ((points - near) ** 2).sum(-1).argmin(axis=0), np.arange(len(points))
+    return near[closer], side[closer]

@@ -10,19 +10,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from icha.support.rules import FORCES, INDENTATIONS, NUMBER, FloatRange
+from icha.support.rules import FloatRange
 from icha.support.tables import numbers_of, read_table
 from icha.support.titles import contradicting_unit, problem_with_numbers, stated_unit
 from icha.support.units import PHYSICAL_NAMES, conversion_factor
 
-# Columns of numbers: bounds in SI units, and headings.
-_RULES = {"force": FORCES, "contact_radius": FloatRange("m", least=0, most=1e9), "indentation": INDENTATIONS}
-_END = r"(?![^\W\d_])"
+# SI unit and an example of a unit of the numbers; beginning of the headings.
+_UNITS = {"force": ("N", "mN"), "contact_radius": ("m", "um"), "indentation": ("m", "um")}
 _HEADINGS = {
-    "force": rf"(?:force|load|f){_END}",
-    "contact_radius": rf"(?:(?:contact[\s_-]*)?radius|a){_END}",
-    "indentation": rf"(?:indentation|depth|delta|δ){_END}",
-    "branch": rf"(?:branch|direction|segment){_END}",
+    "force": r"force|load|f",
+    "contact_radius": r"(?:contact[\s_-]*)?radius|a",
+    "indentation": r"indentation|depth|delta|δ",
+    "branch": r"branch|direction|segment",
 }
 _LOADING = "loading", "load", "approach", "advancing", "in"
 _UNLOADING = "unloading", "unload", "retraction", "retract", "receding", "out"
@@ -45,96 +44,79 @@ class Points(NamedTuple):
 
 
 def read_points(table: Any, columns: Mapping[str, str], units: Mapping[str, str]) -> Points:
-    """Read the points of a JKR test from the path of a file, or from a mapping or data frame of columns.
-
-    Parameters
-    ----------
-    table, columns, units : as in `icha.fit_jkr_test`.
+    """Read the points of a JKR test; arguments as in `icha.fit_jkr_test`.
 
     Raises
     ------
     ValueError
         If a column is missing, a unit is missing or wrong, or a value is not a finite number.
     """
-    for name, given in (("columns", columns), ("units", units)):
-        known = list(_HEADINGS if name == "columns" else _RULES)
+    for name, given, known in (("columns", columns, _HEADINGS), ("units", units, _UNITS)):
         if unknown := [key for key in given if key not in known]:
             raise ValueError(f"{name}: {unknown[0]!r} is not a quantity; expected one of {', '.join(known)}")
     from_file = isinstance(table, str | os.PathLike)
     if from_file:
         headings, rows = read_table(table)
-        places = [f"line {number}" for number, _ in rows]
-    elif hasattr(table, "keys"):
-        headings = [str(key) for key in table.keys()]
+        places, lists = [f"line {number}" for number, _ in rows], zip(*(row for _, row in rows), strict=True)
+    elif hasattr(table, "items"):
+        headings, lists = zip(*((str(title), list(values)) for title, values in table.items()), strict=True)
+        places = [f"point {k}" for k in range(1, 1 + len(lists[0]))]
     else:
         raise ValueError(f"{type(table).__name__} is not a table; expected a path, a mapping or a data frame")
-    found = _find_columns(headings, columns)
-    factors = {name: _factor(found[name], name, units.get(name), from_file) for name in _RULES if name in found}
-    titles = {name: found[name] for name in factors}
+    by_title, found = dict(zip(headings, lists, strict=True)), _find_columns(headings, columns)
+    titles = {name: title for name, title in found.items() if name in _UNITS}
+    factors = [_factor(title, name, units.get(name), from_file) for name, title in titles.items()]
     if from_file:
-        numbers = numbers_of(rows, {headings.index(title): repr(title) for title in titles.values()}, NUMBER)
+        at = {headings.index(title): repr(title) for title in titles.values()}
+        signed = {headings.index(title) for name, title in titles.items() if name != "contact_radius"}
+        numbers = numbers_of(rows, at, FloatRange(least=0), signed)
     else:
-        numbers = [np.asarray(table[title]) for title in titles.values()]
-        places = [f"point {k}" for k in range(1, 1 + numbers[0].size)]
-    values = {}
-    for name, array in zip(titles, numbers, strict=True):
-        if array.shape != (len(places),) or array.dtype.kind not in "fiu":
-            raise ValueError(f"column {titles[name]!r}: expected a list of {len(places)} numbers")
-        values[name] = array * factors[name]
-        for place, value in zip(places, values[name], strict=True):
-            if not _RULES[name].contains(value):
-                rule = _RULES[name]
-                text = (
-                    f"column {titles[name]!r}, {place}: {value:.4g} {rule.unit}; expected {rule.expected} {rule.unit}"
-                )
-                raise ValueError(text)
+        numbers = [np.asarray(by_title[title]) for title in titles.values()]
+        for title, array in zip(titles.values(), numbers, strict=True):
+            if array.shape != (len(places),) or array.dtype.kind not in "fiu" or not np.isfinite(array).all():
+                raise ValueError(f"column {title!r}: expected a list of {len(places)} finite numbers")
     unloading = None
-    if "branch" in found:
-        title = found["branch"]
-        texts = [row[headings.index(title)] for _, row in rows] if from_file else [str(text) for text in table[title]]
+    if title := found.get("branch"):
+        texts = [str(text).strip().lower() for text in by_title[title]]
         for place, text in zip(places, texts, strict=True):
-            if text.strip().lower() not in _LOADING + _UNLOADING:
+            if text not in _LOADING + _UNLOADING:
                 raise ValueError(f"column {title!r}, {place}: {text[:40]!r}; {_BRANCH}")
-        unloading = np.array([text.strip().lower() in _UNLOADING for text in texts])
+        unloading = np.isin(texts, _UNLOADING)
+    values = {name: array * factor for name, array, factor in zip(titles, numbers, factors, strict=True)}
     return Points(values, unloading, places)
 
 
 def _find_columns(headings, columns):
     """Return the heading of each quantity; raise ValueError if a needed column is missing, or if several fit."""
-    listed = f"expected one of {', '.join(headings)}"
-    found = {}
-    for name, pattern in _HEADINGS.items():
-        plain = [unicodedata.normalize("NFKC", each).strip().lower() for each in headings]
-        fitting = [each for each, text in zip(headings, plain, strict=True) if re.match(pattern, text)]
-        if name in columns:
-            if headings.count(columns[name]) != 1:
-                raise ValueError(f"has {headings.count(columns[name]) or 'no'} column {columns[name]!r}; {listed}")
-            found[name] = columns[name]
-        elif len(fitting) > 1:
+    listed, found = ", ".join(headings), dict(columns)
+    for name in _HEADINGS.keys() - columns.keys():
+        start = re.compile(rf"(?:{_HEADINGS[name]})(?![^\W\d_])")
+        fitting = [each for each in headings if start.match(unicodedata.normalize("NFKC", each).strip().lower())]
+        if len(fitting) > 1:
             raise ValueError(f"has several columns for {name}: {', '.join(fitting)}; choose one with `columns`")
-        elif fitting:
-            found[name] = fitting[0]
+        found |= dict.fromkeys([name], *fitting) if fitting else {}
+    for title in found.values():
+        if headings.count(title) != 1:
+            raise ValueError(f"has {headings.count(title) or 'no'} column {title!r}; expected one of {listed}")
     if "force" not in found or not {"contact_radius", "indentation"} & found.keys():
         missing = "force" if "force" not in found else "contact radius or indentation"
         raise ValueError(
-            f"has no column for {missing} among {', '.join(headings)}; expected headings such as force (mN) and "
-            "contact radius (um) or indentation (um). Name other headings with `columns`"
+            f"has no column for {missing} among {listed}; expected headings such as force (mN) and contact radius (um) "
+            "or indentation (um). Name other headings with `columns`"
         )
-    return found
+    return {name: found[name] for name in _HEADINGS if name in found}
 
 
 def _factor(title, name, unit, from_file):
     """Return the factor from the numbers of a column to SI units."""
-    si_unit = _RULES[name].unit
+    si_unit, example = _UNITS[name]
     stated = stated_unit(title)
-    example = "mN" if si_unit == "N" else "um"
-    if unit is None and stated is None and from_file:
+    unit = unit or (stated.text if stated else "" if from_file else si_unit)
+    if not unit:
         raise ValueError(
             f"column {title!r}: the unit is missing; expected a unit of {PHYSICAL_NAMES[si_unit]} in the heading, such "
             f"as '{title} ({example})', or in `units`"
         )
-    if unit is None:
-        unit = stated.text if stated else si_unit
     try:
         factor = float(conversion_factor(unit, si_unit))
     except ValueError as error:

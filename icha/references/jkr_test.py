@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 import os
 import warnings
+from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -14,21 +15,19 @@ import numpy as np
 from icha.asperity.full_contact import HIGH_PULL_OFF_BELOW, full_contact_energy_ratio
 from icha.asperity.material import VAN_DER_WAALS_RANGE, Material
 from icha.asperity.tabor import describe_short_range
-from icha.references.indentation import ContactState, axisymmetric_contact, sphere_contact, sphere_energy_release_rate
-from icha.references.jkr_loop import LEAST_POINTS, LOADING, RECEDING, STUCK, Loop, fit_loop
+from icha.references.indentation import axisymmetric_contact, sphere_contact, sphere_energy_release_rate
+from icha.references.jkr_loop import Loop, fit_loop
 from icha.references.jkr_tables import Points, read_points
 from icha.support.formatting import choose_unit, format_count
-from icha.support.rules import INDENTATIONS, LENGTH, POSITIVE, SEED
+from icha.support.rules import INDENTATIONS, LENGTH, POSITIVE
 from icha.support.usual import IchaWarning, unusual_arguments
 from icha.surfaces.shapes import Sphere
 
 if TYPE_CHECKING:
     from icha.surfaces.surface import Surface
 
-# Probability that an interval contains the true value, and number of fits for the intervals.
-PROBABILITY, _RESAMPLES = 0.9, 500
-# Reasons for which points are left out.
-BEFORE, AFTER, WITHOUT = "before contact", "after pull-off", "without contact"
+# Probability that an interval contains the true value; smallest number of points that determine a work of adhesion.
+PROBABILITY, LEAST_POINTS = 0.9, 3
 # Under displacement control, a sphere of JKR jumps off at 5/9 of the pull-off force. Points with less tension, after
 # the point of the largest tension, are without contact.
 _JUMP_OFF_SHARE = 0.5
@@ -36,14 +35,11 @@ _JUMP_OFF_SHARE = 0.5
 _CLEAR_TENSION = 4.0
 # Largest relative error of the force without a warning, by the curvature of the sphere and by the thickness of a layer.
 _FORCE_ERROR = 0.02
-# Largest force over the pull-off force without a warning. docs/estimates.md gives the share of intervals that contain
-# the truth at 10 and 20 times the pull-off force.
+# Largest force over the pull-off force without a warning; docs/estimates.md gives the intervals of larger loads.
 _MOST_FORCE = 12.0
 # Neighbouring residuals are not random if their correlation exceeds the first number, and the second number divided by
-# the root of the number of points.
-_CORRELATION, _BY_CHANCE = 0.3, 2.5
-# Residuals below this fraction of the errors are due to rounding.
-_ROUNDING = 1e-4
+# the root of the number of points. Smaller residuals than the third number, in units of the errors, are rounded.
+_CORRELATION, _BY_CHANCE, _ROUNDING = 0.3, 2.5, 1e-4
 
 
 class Estimate(NamedTuple):
@@ -54,10 +50,10 @@ class Estimate(NamedTuple):
     high: float
 
     def text(self, unit: str) -> str:
-        """Return value and interval with a prefixed unit, such as `31 (29 to 33) mJ/m²`."""
+        """Return value and interval with a prefixed unit, such as `31 mJ/m², 90 % interval 29 to 33 mJ/m²`."""
         factor, name = choose_unit(max(map(abs, self)), unit)
         value, low, high = (f"{each * factor:.3g}" for each in self)
-        return f"{value} {name}, {PROBABILITY:.0%} interval {low} to {high} {name}".replace("%", " %")
+        return f"{value} {name}, {100 * PROBABILITY:.0f} % interval {low} to {high} {name}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +70,8 @@ class JKRTest:
     measured : (n,) float by quantity, the points of the table in its order.
     fitted : (n,) float by quantity, the nearest state of the fit to each point; NaN for points that are left out.
     used_for : (n,) text: `loading`, `stuck` or `receding`, or why the point is left out.
-    warnings : why the values must not be used without care.
     loop : the fitted loop.
+    warnings : why the values must not be used without care.
     """
 
     radius: float
@@ -86,8 +82,8 @@ class JKRTest:
     measured: dict[str, np.ndarray]
     fitted: dict[str, np.ndarray]
     used_for: np.ndarray
-    warnings: tuple[str, ...]
     loop: Loop
+    warnings: tuple[str, ...] = ()
 
     @property
     def residuals(self) -> dict[str, np.ndarray]:
@@ -97,19 +93,7 @@ class JKRTest:
     @property
     def counts(self) -> dict[str, int]:
         """Number of points by use, or by the reason for which they are left out."""
-        return {use: int(np.sum(self.used_for == use)) for use in dict.fromkeys(self.used_for.tolist())}
-
-    def curves(self) -> dict[str, ContactState]:
-        """Return the fitted states by branch, from the smallest to the largest contact and back."""
-        branches = {"loading": LOADING}
-        if np.isin(self.used_for, _UNLOADING).any():
-            branches["stuck"] = STUCK
-        if self.receding_work:
-            branches["receding"] = RECEDING
-        return {
-            name: self.loop.state(self.radius, np.array(branch), *self.loop.trace(self.radius, branch))
-            for name, branch in branches.items()
-        }
+        return dict(Counter(self.used_for.tolist()))
 
     def __str__(self) -> str:
         """Return the values with their intervals, the use of the points, and the warnings."""
@@ -124,10 +108,6 @@ class JKRTest:
         return "\n".join([*lines, *(f"warning: {text}" for text in self.warnings)])
 
 
-_USES = np.array(["loading", "stuck", "receding"], dtype=object)
-_UNLOADING = ["stuck", "receding"]
-
-
 def fit_jkr_test(
     table: str | os.PathLike | Mapping[str, Any],
     radius: float,
@@ -139,7 +119,6 @@ def fit_jkr_test(
     interaction_range: float = VAN_DER_WAALS_RANGE,
     thickness: float = math.inf,
     roughness: Surface | None = None,
-    seed: int = 0,
 ) -> JKRTest:
     """Fit contact modulus and works of adhesion to the measured points of a lens that is pressed and pulled off.
 
@@ -162,7 +141,6 @@ def fit_jkr_test(
     interaction_range : range of the attraction, m, for the warning of small Tabor parameters.
     thickness : thickness of an elastic layer, m; infinite for a half-space.
     roughness : surface with the roughness of lens and sample, for the warning of rough surfaces.
-    seed : seed of the resamples that give the intervals.
 
     Raises
     ------
@@ -175,207 +153,143 @@ def fit_jkr_test(
         For each of the `warnings` of the result.
     """
     radius = LENGTH.validate("radius", radius)
-    seed = SEED.validate("seed", seed)
     if indentation_offset is not None:
         indentation_offset = INDENTATIONS.validate("indentation_offset", indentation_offset)
     if thickness != math.inf:
         LENGTH.validate("thickness", thickness)
-    name = f"{os.fspath(table)}: " if isinstance(table, str | os.PathLike) else "table: "
     try:
         points = read_points(table, columns or {}, units or {})
         used_for, unloading = _choose_points(points, radius)
     except ValueError as error:
-        raise ValueError(f"{name}{error}") from None
-    used = np.array([not use for use in used_for])
-    chosen = {quantity: values[used] for quantity, values in points.values.items()}
-    fit_offset = indentation_offset is None and "indentation" in chosen
-    if indentation_offset is not None and "indentation" in chosen:
-        chosen["indentation"] = chosen["indentation"] - indentation_offset
-    ranges = {q: float(np.max(v) if q == "contact_radius" else np.ptp(v)) for q, v in chosen.items()}
-    if missing := [quantity for quantity in chosen if errors and quantity not in errors]:
-        raise ValueError(f"errors: no value for {missing[0]}; expected one for {', '.join(chosen)}")
-    deviations = {q: POSITIVE.validate(f"errors, {q}", errors[q]) for q in chosen} if errors else ranges
-    fit = fit_loop(chosen, unloading[used], deviations, radius, fit_offset=fit_offset, resamples=_RESAMPLES, seed=seed)
-    used_for[used] = _USES[fit.branch]
-    loop = fit.loop if indentation_offset is None else fit.loop._replace(offset=indentation_offset)
-    ends = (1 - PROBABILITY) / 2, (1 + PROBABILITY) / 2
-    estimates = {
-        name: Estimate(value, *(float(end) for end in np.quantile(drawn, ends)))
-        for name, value, drawn in zip(Loop._fields, fit.loop, fit.resampled, strict=True)
-    }
-    fitted = {quantity: np.full(len(used), np.nan) for quantity in points.values}
-    for quantity, values in fitted.items():
-        values[used] = getattr(fit.states, quantity)
-    if indentation_offset is not None and "indentation" in fitted:
-        fitted["indentation"] += indentation_offset
-    found = JKRTest(
-        radius,
-        estimates["contact_modulus"],
-        estimates["advancing_work"],
-        estimates["receding_work"] if np.sum(fit.branch == RECEDING) >= LEAST_POINTS else None,
-        estimates["offset"] if fit_offset else None,
-        points.values,
-        fitted,
-        used_for,
-        (),
-        loop,
-    )
-    reasons = tuple(_warnings(found, fit.states, ranges, interaction_range, thickness, roughness))
-    for reason in reasons:
+        name = os.fspath(table) if isinstance(table, str | os.PathLike) else "table"
+        raise ValueError(f"{name}: {error}") from None
+    used, measured = used_for == "", points.values
+    chosen = {quantity: values[used] for quantity, values in measured.items()}
+    if not errors:
+        errors = {name: float(max(each) if name == "contact_radius" else np.ptp(each)) for name, each in chosen.items()}
+    elif missing := chosen.keys() - errors.keys():
+        raise ValueError(f"errors: no value for {min(missing)}; expected one for {', '.join(chosen)}")
+    errors = {name: POSITIVE.validate(f"errors, {name}", errors[name]) for name in chosen}
+    loops, near, used_for[used] = fit_loop(chosen, unloading[used], errors, radius, indentation_offset, PROBABILITY)
+    fitted = {name: np.full(len(used), np.nan) for name in chosen}
+    for name, nearest in zip(chosen, near, strict=True):
+        fitted[name][used] = nearest
+    modulus, advancing, receding, _, offset = map(Estimate, *loops)
+    recedes = np.sum(used_for == "receding") >= LEAST_POINTS
+    fits_offset = "indentation" in chosen and indentation_offset is None
+    values = modulus, advancing, receding if recedes else None, offset if fits_offset else None
+    test = JKRTest(radius, *values, measured, fitted, used_for, loops[0])
+    test = replace(test, warnings=tuple(_warnings(test, errors, interaction_range, thickness, roughness)))
+    for reason in test.warnings:
         warnings.warn(reason, IchaWarning, stacklevel=2)
-    object.__setattr__(found, "warnings", reasons)
-    return found
+    return test
 
 
 def _choose_points(points: Points, radius: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return why each point is left out ("" if it is used), and which points belong to unloading.
-
-    Raises
-    ------
-    ValueError
-        If the points are not those of a JKR test.
-    """
+    """Return why each point is left out ("" if it is used), and which points belong to unloading."""
     values, places = points.values, points.places
     force, contact = values["force"], values.get("contact_radius")
     top, bottom = int(np.argmax(force)), int(np.argmin(force))
     size = contact if contact is not None else values["indentation"]
     if not force[top] > 0 or (size[bottom] > size[top] and force[top] < -force[bottom]):
-        reason = (
-            "no force is positive"
-            if not force[top] > 0
-            else f"the contact is larger at {places[bottom]} than at {places[top]}, the largest force"
+        raise ValueError(
+            f"{places[bottom]}, the smallest force, looks like the largest load; expected forces that are positive in "
+            "compression. Change the sign of the forces"
         )
-        raise ValueError(f"{reason}; expected forces that are positive in compression. Change the sign of the forces")
     if contact is not None and (large := np.flatnonzero(contact >= radius)).size:
         raise ValueError(
             f"contact radius, {places[large[0]]}: {contact[large[0]]:.4g} m is not less than the radius of the lens, "
             f"{radius:.4g} m. Check the units, and that the column contains radii, not diameters or areas"
         )
-    order = np.arange(len(force))
-    unloading = order > top if points.unloading is None else points.unloading
-    left_out = np.full(len(force), "", dtype=object)
+    unloading = np.arange(len(force)) > top if points.unloading is None else points.unloading
     if contact is not None:
-        left_out[contact == 0] = WITHOUT
+        left_out = np.where(contact == 0, "without contact", "").astype(object)
     else:
-        left_out[:] = np.where(_without_contact(force, unloading), np.where(unloading, AFTER, BEFORE), "")
-    kept = left_out == ""
-    if (count := int(np.sum(kept & ~unloading))) < LEAST_POINTS:
+        left_out = _without_contact(force, unloading)
+    kept, unknowns = left_out == "", 2 + (contact is None) + 2 * bool(unloading.any())
+    loading = int(np.sum(kept & ~unloading))
+    if loading < LEAST_POINTS or kept.sum() <= unknowns:
         raise ValueError(
-            f"has {format_count(count, 'point')} of loading with contact; expected at least {LEAST_POINTS}, in the "
-            "order of the test or with a column `branch`"
+            f"has {format_count(loading, 'point')} of loading and {kept.sum() - loading} of unloading with contact; "
+            f"expected at least {LEAST_POINTS} of loading and {unknowns + 1} together, in the order of the test or "
+            "with a column `branch`"
         )
-    unknowns = 2 + (contact is None) + 2 * bool((kept & unloading).any())
-    if kept.sum() <= unknowns:
-        raise ValueError(f"has {kept.sum()} points with contact; expected more than {unknowns}, the number of unknowns")
-    for quantity, column in values.items():
-        if not np.ptp(column[kept]) > 0:
-            raise ValueError(f"column of {quantity}: all values are the same; expected measured values")
+    if constant := [quantity for quantity, column in values.items() if not np.ptp(column[kept]) > 0]:
+        raise ValueError(f"column of {constant[0]}: all values are the same; expected measured values")
     return left_out, unloading
 
 
 def _without_contact(force, unloading):
-    """Return which points are before the contact forms or after it breaks, for tests without contact radii."""
-    outside = np.zeros(len(force), bool)
+    """Return why points of tests without contact radii are left out: before the contact forms, or after it breaks."""
+    left_out = np.full(len(force), "", object)
     loading, after = np.flatnonzero(~unloading), np.flatnonzero(unloading)
     if loading.size and force[loading].min() <= 0:
         # Contact begins with the largest tension of loading; or, if noise hides it, after the last force of 0.
         lowest, last = int(np.argmin(force[loading])), int(np.flatnonzero(force[loading] <= 0)[-1])
         noise = np.median(np.abs(np.diff(force[loading[: last + 1]]))) / 0.95 if last else 0.0
-        clear = -force[loading[lowest]] > _CLEAR_TENSION * noise
-        outside[loading[: lowest if clear else last + 1]] = lowest > 1
+        begin = lowest if -force[loading[lowest]] > _CLEAR_TENSION * noise else last + 1
+        left_out[loading[: begin * (lowest > 1)]] = "before contact"
     if after.size and (largest := -force[after].min()) > 0:
-        lowest = int(np.argmin(force[after]))
-        off = np.flatnonzero(-force[after[lowest:]] < _JUMP_OFF_SHARE * largest)
-        if off.size:
-            outside[after[lowest + off[0] :]] = True
-    return outside
+        off = (np.arange(after.size) > force[after].argmin()) & (-force[after] < _JUMP_OFF_SHARE * largest)
+        left_out[after[np.logical_or.accumulate(off)]] = "after pull-off"
+    return left_out
 
 
-def _warnings(test, states, ranges, interaction_range, thickness, roughness) -> Iterator[str]:
-    """Yield why the result must not be used without care."""
+def _warnings(test, errors, interaction_range, thickness, roughness) -> Iterator[str]:
+    """Yield why the result must not be used without care, with the size of the error."""
     modulus, advancing = test.contact_modulus.value, test.advancing_work.value
-    receding = test.receding_work.value if test.receding_work else None
-    works = {"surface_energy": max(advancing, receding or 0.0)}
-    yield from unusual_arguments({"radius": test.radius, "contact_modulus": modulus} | works)
-    unloading = np.isin(test.used_for, _UNLOADING)
+    unloading, largest = np.isin(test.used_for, ["stuck", "receding"]), test.loop.stuck_radius
+    work = max(advancing, test.receding_work.value if test.receding_work else 0.0)
+    yield from unusual_arguments({"radius": test.radius, "contact_modulus": modulus, "surface_energy": work})
     if not unloading.any():
         yield "there are no points of unloading with contact, so there is no receding work of adhesion"
-    elif receding is None:
-        stuck = np.flatnonzero(unloading)[np.argmin(test.measured["force"][unloading])]
-        rate = sphere_energy_release_rate(test.fitted["force"][stuck], test.loop.stuck_radius, test.radius, modulus)
+    elif not test.receding_work:
+        last = np.flatnonzero(unloading)[np.argmin(test.measured["force"][unloading])]
+        rate = sphere_energy_release_rate(test.fitted["force"][last], largest, test.radius, modulus)
         yield (
             "the contact is stuck at nearly all points of unloading, so there is no receding work of adhesion; it is "
             f"at least about {1e3 * rate:.3g} mJ/m². Measure up to pull-off, or load less"
         )
-    elif receding < advancing:
+    elif test.receding_work.value < advancing:
         yield "the receding work of adhesion is less than the advancing one, which no law of adhesion explains"
-    if advancing * 1.5 * math.pi * test.radius < 1e-3 * ranges["force"]:
-        yield "Hertz's law fits the points of loading: their work of adhesion is too small for these forces"
-    pull_off = 1.5 * math.pi * test.radius * works["surface_energy"]
-    if (force := float(test.measured["force"].max())) > _MOST_FORCE * pull_off > 0:
+    force, pull_off = float(test.measured["force"].max()), 1.5 * math.pi * test.radius * work
+    if force > _MOST_FORCE * pull_off:
         yield (
-            f"the largest force is {force / pull_off:.0f} times the pull-off force: noise hides the adhesion, and the "
-            "intervals are too narrow; use smaller loads"
+            f"the largest force is {force / pull_off if pull_off else math.inf:.3g} times the pull-off force: noise "
+            "hides the adhesion; smaller loads give narrower intervals"
         )
-    if not unloading.any() and test.indentation_offset:
-        yield "without unloading, the offset of the indentation is hardly distinguishable from adhesion"
-    yield from _limits_of_jkr(test, float(np.max(states.contact_radius)), interaction_range, thickness, roughness)
-    if (correlation := _largest_correlation(test, ranges)) > 0:
-        yield (
-            f"residuals of neighbouring points are correlated ({correlation:.2f}), so the law does not describe the "
-            "points within their noise, and the intervals are too narrow; look at the residuals in the figure"
-        )
-
-
-def _limits_of_jkr(test, largest, interaction_range, thickness, roughness):
-    """Yield the limits of the law of JKR that a test exceeds, with the size of the error."""
-    modulus, advancing = test.contact_modulus.value, test.advancing_work.value
     size = min(largest, 0.99 * test.radius)
     exact = axisymmetric_contact(size, Sphere(test.radius).slope, modulus).force
     if (error := float(exact / sphere_contact(size, test.radius, modulus).force - 1)) > _FORCE_ERROR:
         yield (
             f"the contact radius is up to {largest / test.radius:.2g} times the radius of the lens: JKR is for a "
-            f"paraboloid, and on a sphere the force without adhesion is {error:.1%} larger; use smaller loads"
-        ).replace("%", " %")
-    if thickness != math.inf and (error := _layer_error(largest / thickness)) > _FORCE_ERROR:
-        yield (
-            f"the contact radius is up to {largest / thickness:.2g} times the thickness: on a bonded, incompressible "
-            f"layer, the force at an indentation is about {100 * error:.0f} % larger than on a half-space; use thicker "
-            "samples or smaller loads"
+            f"paraboloid, and on a sphere the force without adhesion is {100 * error:.1f} % larger; use smaller loads"
         )
-    energy = advancing or (test.receding_work.value if test.receding_work else 0.0)
-    if not energy:
-        return
-    material = Material(modulus, energy, interaction_range)
-    if short := describe_short_range(float(material.tabor_parameter(test.radius))):
-        yield short
-    if roughness is not None:
-        ratio = full_contact_energy_ratio(roughness.full_contact_energy, modulus, energy)
-        if ratio > 1 / HIGH_PULL_OFF_BELOW:
+    # E. K. Dimitriadis et al., Biophys. J. 82 (2002) 2798, doi:10.1016/S0006-3495(02)75620-8: Poisson ratio 1/2.
+    ratio = largest / thickness
+    if (error := np.polynomial.polynomial.polyval(ratio, [0.0, 1.133, 1.283, 0.769, 0.0975])) > _FORCE_ERROR:
+        yield (
+            f"the contact radius is up to {ratio:.2g} times the thickness: on a bonded, incompressible layer, the "
+            f"force at an indentation is about {100 * error:.0f} % larger than on a half-space; use thicker samples or "
+            "smaller loads"
+        )
+    if work:
+        energy = advancing or work
+        if short := describe_short_range(
+            float(Material(modulus, energy, interaction_range).tabor_parameter(test.radius))
+        ):
+            yield short
+        bending = full_contact_energy_ratio(roughness.full_contact_energy, modulus, energy) if roughness else 0.0
+        if bending > 1 / HIGH_PULL_OFF_BELOW:
             yield (
-                f"U_full/Δγ = {ratio:.2g}: bending the surface into the roughness takes {100 * ratio:.0f} % of the "
+                f"U_full/Δγ = {bending:.2g}: bending the surface into the roughness takes {100 * bending:.0f} % of the "
                 "fitted work of adhesion, which is an apparent one, below that of smooth surfaces"
             )
-
-
-def _layer_error(ratio):
-    """Return the relative increase of Hertz's force by a bonded layer of Poisson ratio 1/2.
-
-    ratio : contact radius sqrt(R delta) over thickness. Source: E. K. Dimitriadis et al., Biophys. J. 82 (2002) 2798,
-    doi:10.1016/S0006-3495(02)75620-8.
-    """
-    return np.polynomial.polynomial.polyval(ratio, [0.0, 1.133, 1.283, 0.769, 0.0975])
-
-
-def _largest_correlation(test, ranges):
-    """Return the correlation of neighbouring residuals of the force on a branch if they are not random; else 0."""
-    found = [0.0]
-    for uses in (["loading"], _UNLOADING):
-        residual = test.residuals["force"][np.isin(test.used_for, uses)]
-        # Residuals of a stuck contact whose radius is measured have no component along the force.
-        residual = residual[np.abs(residual) > _ROUNDING * 1e-2 * ranges["force"]]
-        if len(residual) > 2 * LEAST_POINTS:
-            correlation = float(residual[1:] @ residual[:-1] / (residual @ residual))
-            if correlation > max(_CORRELATION, _BY_CHANCE / math.sqrt(len(residual))):
-                found.append(correlation)
-    return max(found)
+    residual = np.stack([test.residuals[name] / error for name, error in errors.items()])
+    residual = residual[:, (np.abs(residual) > _ROUNDING).any(axis=0)]
+    correlation = np.sum(residual[:, 1:] * residual[:, :-1]) / max(np.sum(residual**2), np.finfo(float).tiny)
+    if correlation > max(_CORRELATION, _BY_CHANCE / math.sqrt(max(residual.shape[1], 1))):
+        yield (
+            f"residuals of neighbouring points are correlated ({correlation:.2f}), so the law does not describe the "
+            "points within their noise, and the intervals are too narrow; look at the residuals in the figure"
+        )

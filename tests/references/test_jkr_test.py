@@ -59,18 +59,12 @@ def test_intervals_contain_the_truth_in_eight_to_ten_of_ten_tests():
     rng, inside = np.random.default_rng(1), dict.fromkeys(TRUTH, 0)
     for number in range(10):
         columns, offset = COLUMNS[number % 2 :][:1], 1e-6 * (number % 2)
-        test = icha.fit_jkr_test(noisy_test(EXACT, rng, columns, offset), RADIUS, seed=number)
+        test = icha.fit_jkr_test(noisy_test(EXACT, rng, columns, offset), RADIUS)
         for name, value in TRUTH.items():
             interval = getattr(test, name)
             assert interval.low < interval.value < interval.high
             inside[name] += interval.low <= value <= interval.high
     assert all(8 <= count <= 10 for count in inside.values()), inside
-
-
-def test_the_seed_determines_the_intervals():
-    table = noisy_test(EXACT, np.random.default_rng(1), COLUMNS[:1])
-    first, again, other = (icha.fit_jkr_test(table, RADIUS, seed=seed).advancing_work for seed in (1, 1, 2))
-    assert first == again and first.value == other.value and first != other
 
 
 @pytest.mark.parametrize(
@@ -123,7 +117,7 @@ def test_without_unloading_there_is_only_the_advancing_work():
     with pytest.warns(icha.IchaWarning, match="no points of unloading"):
         test = icha.fit_jkr_test(table, RADIUS)
     assert test.receding_work is None and "receding" not in str(test).split("warning")[0]
-    assert test.advancing_work.value == pytest.approx(0.03, rel=1e-3) and set(test.curves()) == {"loading"}
+    assert test.advancing_work.value == pytest.approx(0.03, rel=1e-3) and set(test.counts) == {"loading"}
 
 
 def test_a_stuck_contact_gives_a_lower_bound_of_the_receding_work():
@@ -181,7 +175,7 @@ def test_points_of_another_law_have_correlated_residuals():
     [
         ("force (mN),a (um)\n1,100\n2,nan\n", "column 'a (um)', line 3: 'nan'; expected a number"),
         ("force (mN),a (um)\n1,100\n2,\n", "column 'a (um)', line 3: ''; expected a number"),
-        ("force (mN),a (um)\n1,100\n2,-1\n", "column 'a (um)', line 3: -1e-06 m; expected a number in [0, 1e9] m"),
+        ("force (mN),a (um)\n1,100\n2,-1\n", "column 'a (um)', line 3: '-1'; expected a number, 0 or greater"),
         ("force (mN),a (um)\n1,100\n2,120\n3,9000\n4,150\n", "line 4: 0.009 m is not less than the radius of the lens"),
         ("force,a (um)\n1,2\n", "column 'force': the unit is missing; expected a unit of force"),
         ("force (um),a (um)\n1,2\n", "'um' is not a unit of force; expected a unit such as mN"),
@@ -192,10 +186,16 @@ def test_points_of_another_law_have_correlated_residuals():
         ("a (um),t\n2,1\n", "has no column for force"),
         ("force (mN),load (N),a (um)\n1,2,3\n", "has several columns for force: force (mN), load (N); choose one"),
         ("force (mN) x 10,a (um)\n1,2\n", "contains a factor"),
-        ("force (mN),a (um)\n-1,10\n-2,20\n-3,30\n-2,25\n", "no force is positive; expected forces that are positive"),
-        ("force (mN),a (um)\n0,10\n-2,20\n-3,30\n1,5\n", "the contact is larger at line 4 than at line 5, the largest"),
-        ("force (mN),a (um)\n1,10\n2,20\n", "has 2 points of loading with contact; expected at least 3"),
-        ("force (mN),a (um)\n3,100\n2,90\n1,80\n0,70\n", "has 1 point of loading with contact"),
+        (
+            "force (mN),a (um)\n-1,10\n-2,20\n-3,30\n-2,25\n",
+            "line 4, the smallest force, looks like the largest load; expected forces",
+        ),
+        ("force (mN),a (um)\n0,10\n-2,20\n-3,30\n1,5\n", "line 4, the smallest force, looks like the largest load"),
+        (
+            "force (mN),a (um)\n1,10\n2,20\n",
+            "has 2 points of loading and 0 of unloading with contact; expected at least 3",
+        ),
+        ("force (mN),a (um)\n3,100\n2,90\n1,80\n0,70\n", "has 1 point of loading and 3 of unloading with contact"),
         ("force (mN),a (um)\n1,10\n2,10\n3,10\n4,10\n", "contact_radius: all values are the same"),
         ("force (mN),a (um),branch\n1,10,loading\n2,20,hold\n", "column 'branch', line 3: 'hold'; expected loading or"),
     ],
@@ -215,7 +215,7 @@ def test_tables_that_are_no_jkr_test_are_refused(text, message, tmp_path):
         (EXACT, {"units": {"strength": "N"}}, "units: 'strength' is not a quantity"),
         (EXACT, {"columns": {"force": "load"}}, "has no column 'load'; expected one of force, contact_radius"),
         (EXACT, {"errors": {"force": 1e-5}}, "errors: no value for contact_radius"),
-        (EXACT | {"force": ["1"] * 40}, {}, "column 'force': expected a list of 40 numbers"),
+        (EXACT | {"force": ["1"] * 40}, {}, "column 'force': expected a list of 40 finite numbers"),
         ([1.0], {}, "list is not a table"),
     ],
 )
