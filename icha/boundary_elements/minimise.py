@@ -130,6 +130,9 @@ def minimise(
         After too many iterations, or if no step lowers the energy.
     """
     space, law = problem.space, problem.law
+    # A gap of rounding in a closed cell would count as open, and each step would close it again.
+    position = position.copy()
+    problem.crop(position)[problem.crop(position) - problem.heights < tolerance] = -np.inf
     now, last, refused = _start(problem, position, fraction, control), None, 0
     closed, opened, pending = np.zeros(fraction.shape, bool), np.zeros(fraction.shape, bool), 0
     # Cells inside a short-ranged contact of a calm state; cells that close for a moment must be free to open.

@@ -6,7 +6,9 @@ from scipy.optimize import minimize
 
 import icha
 from icha.boundary_elements.contact import contact_of
+from icha.boundary_elements.elastic import HalfSpace
 from icha.boundary_elements.laws import Cohesive
+from icha.boundary_elements.minimise import Control, Problem, minimise
 from icha.checks.run import check_run
 from icha.contact.attraction import FINITE_RANGE, SHORT_RANGE, attraction_on, resolving_spacing
 from validation.surfaces import wave
@@ -91,3 +93,18 @@ def test_contact_of_ridges_leaves_room_for_the_gap():
     material = icha.Material(MODULUS, energy, 0.05 * 16 * energy / (9 * np.sqrt(3) * top))
     run = icha.simulate(surface, material, icha.Path(pressures=[0.1 * top], snapshots=[]), model="boundary_elements")
     assert 0.2 < float(run.contact_area_fraction[-1]) < 0.35
+
+
+@pytest.mark.parametrize(("work", "reach", "mean_gap", "part"), [(3, 3, 0.05, 0.03), (8, 20, 0.0145, 0.03)])
+def test_gaps_of_rounding_do_not_count_as_open(work, reach, mean_gap, part):
+    """Close to full contact, all gaps are in a few cells. In the start, half of the other cells have tiny gaps."""
+    surface = icha.SelfAffineSpectrum(1e-4, 5e-5, 6e-4 / 32, 0.8, 1.0).realise(32, 0)
+    heights = surface.heights / surface.rms_height * 2.3
+    rng, law = np.random.default_rng(0), Cohesive(work, 2 * work / reach)
+    deep = (heights < np.quantile(heights, part)).astype(float)
+    space, control = HalfSpace.under(32), Control(mean=heights.mean() + mean_gap)
+    positions = [heights + deep * mean_gap / deep.mean()]
+    positions.append(positions[0] + 1e-14 * rng.random(heights.shape) * (rng.random(heights.shape) < 0.5))
+    found = [minimise(Problem(space, law, heights), each, 0 * each + 1, control, 1e-8) for each in positions]
+    assert found[0].load == pytest.approx(found[1].load, rel=1e-6)
+    assert np.array_equal(found[0].held, found[1].held)
