@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 
-def mask_of(cells: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Return a bool field of a given shape that is True at the given cells and False elsewhere."""
-    mask = np.zeros(shape, dtype=bool)
-    mask.ravel()[cells] = True
-    return mask
+def field_of(cells: np.ndarray | slice, values: np.ndarray | float, shape: tuple[int, ...]) -> np.ndarray:
+    """Return a field of a given shape with values on some cells, (k,) or a number, and zero elsewhere."""
+    field = np.zeros(shape, np.result_type(values))
+    field.ravel()[cells] = values
+    return field
 
 
 def adjacent(cells: np.ndarray, grid: int) -> np.ndarray:

@@ -9,14 +9,22 @@ from functools import cached_property
 from importlib.metadata import version
 
 import numpy as np
-from numpy.typing import DTypeLike
 
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
 from icha.boundary_elements import minimise as solver
+from icha.boundary_elements.cells import field_of
 from icha.boundary_elements.elastic import HalfSpace
 from icha.boundary_elements.full_contact import ROUNDING, FullContactProblem
-from icha.boundary_elements.laws import TOUCHING, AtDistance, Cohesive, NoAttraction, ShortRange, at_cells, average
+from icha.boundary_elements.laws import (
+    TOUCHING,
+    AtDistance,
+    Cohesive,
+    NoAttraction,
+    ShortRange,
+    at_cells,
+    average,
+)
 from icha.boundary_elements.observables import PatchObservables
 from icha.boundary_elements.patches import (
     BEYOND_EDGES,
@@ -281,11 +289,9 @@ class BoundaryElements(FullContactProblem):
             displacement -= displacement.mean()
         return self.crop(displacement) * self.spacing
 
-    def field(self, cells: np.ndarray, values: np.ndarray, dtype: DTypeLike = float) -> np.ndarray:
+    def field(self, cells: np.ndarray, values: np.ndarray | float) -> np.ndarray:
         """Return a field of the grid with given values on cells (k,), and zero elsewhere."""
-        field: np.ndarray = np.zeros((self.space.grid,) * 2, dtype)
-        field.ravel()[cells] = values
-        return field
+        return field_of(cells, values, (self.space.grid,) * 2)
 
     def crop(self, field: np.ndarray) -> np.ndarray:
         """Return a field of the grid without the margin of a free square."""

@@ -25,17 +25,15 @@ Lengths are in units of the cell size, pressures in E*.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from icha.boundary_elements.cells import field_of
 from icha.boundary_elements.elastic import multiply_modes
 from icha.contact.attraction import BOND_COMPLIANCE, FINITE_RANGE, NO_ATTRACTION, SHORT_RANGE, straight_strength
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
 
 # Width and radius of the stencil in cells, and weight of the perimeter in the work of adhesion, fitted to JKR patches.
 _WIDTH, STENCIL_RADIUS = 1.5, 5
@@ -132,9 +130,7 @@ class Bonds:
 
     def field(self, values: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
         """Return the field, (n, n), from the values of the cells, (k,); it is zero elsewhere."""
-        field = np.zeros(shape)
-        field.ravel()[self.cells] = values
-        return field
+        return field_of(self.cells, values, shape)
 
     def energy_beyond_mean_tension(self, before: np.ndarray, after: np.ndarray, change: np.ndarray) -> float:
         """Return the change of the energy minus the mean tension times the change of the gap, in E* times cell size^3.
@@ -283,30 +279,25 @@ class Tangent:
     cells : (k,) int, flat indices of the cells with 0 < f < 1.
     fraction, softening : (k,), values of the cells.
     peak : (k,), tension at zero gap in the direction of each front; infinite where it stands.
-    coupling : (k, k) sparse, change of the peaks with the fractions; None without an effect.
+    peak_change : function that returns the changes of the peaks, (k,), from those of the fractions of all cells,
+        (n, n); None without an effect.
     """
 
     cells: np.ndarray
     fraction: np.ndarray
     peak: np.ndarray
     softening: np.ndarray
-    coupling: csr_array | None = None
-
-    def field(self, values: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-        """Return the field, (n, n), from the values of the cells, (k,); it is zero elsewhere."""
-        field = np.zeros(shape)
-        field.ravel()[self.cells] = values
-        return field
+    peak_change: Callable[[np.ndarray], np.ndarray] | None = None
 
     def changes(self, gap_change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the changes of fractions and tensions, (k,) each, for a change of the gaps, (n, n)."""
+        """Return the changes of fractions and tensions, (n, n) each, for a change of the gaps, (n, n)."""
         tension = -self.softening * gap_change.ravel()[self.cells]
-        fraction = tension / self.peak
-        if self.coupling is None:
-            return fraction, tension
+        fraction = field_of(self.cells, tension / self.peak, gap_change.shape)
+        if self.peak_change is None:
+            return fraction, field_of(self.cells, tension, gap_change.shape)
         for _ in range(_ROUNDS):
-            fraction = (tension + (1 - self.fraction) * (self.coupling @ fraction)) / self.peak
-        return fraction, tension + self.coupling @ fraction
+            fraction.ravel()[self.cells] = (tension + (1 - self.fraction) * self.peak_change(fraction)) / self.peak
+        return fraction, field_of(self.cells, tension + self.peak_change(fraction), gap_change.shape)
 
 
 def directed(bonds: LinearBonds, ratio: float, before: np.ndarray | None) -> Bonds:
@@ -320,21 +311,6 @@ def peak_by_direction(bonds: Bonds, gap: np.ndarray) -> np.ndarray:
     """Return the tension of each cell at zero gap in the direction of its front, (k,); infinite where it stands."""
     ratio = bonds.direction(gap)
     return np.where(ratio > 0, bonds.peak * np.sqrt(ratio), np.inf)
-
-
-def weights_between(cells: np.ndarray, grid: int) -> csr_array:
-    """Return the sparse matrix of the weights w between cells of a periodic grid, (k, k)."""
-    from scipy.sparse import csr_array
-
-    number = np.full(grid**2, -1)
-    number[cells] = np.arange(len(cells))
-    offset = np.arange(-STENCIL_RADIUS, STENCIL_RADIUS + 1)
-    (row, column), weight = np.divmod(cells[:, None], grid), np.outer(STENCIL, STENCIL).ravel()
-    rows, columns = (row + offset) % grid, (column + offset) % grid
-    neighbour = number[(rows[:, :, None] * grid + columns[:, None, :]).reshape(len(cells), offset.size**2)]
-    present = neighbour >= 0
-    starts = np.concatenate([[0], np.cumsum(np.count_nonzero(present, axis=1))])
-    return csr_array((np.broadcast_to(weight, present.shape)[present], neighbour[present], starts), (len(cells),) * 2)
 
 
 class AtDistance(Bonds):
@@ -399,7 +375,7 @@ class AtDistance(Bonds):
         """Return 0: a law that does not depend on the direction dissipates nothing at fronts."""
         return 0.0
 
-    def tangent(self, bonds: Bonds, fraction: np.ndarray, gap: np.ndarray, grid: int) -> Tangent:
+    def tangent(self, bonds: Bonds, fraction: np.ndarray, gap: np.ndarray) -> Tangent:
         """Return the tangent of the law at given fractions and gaps, (k,)."""
         partial = np.flatnonzero((fraction > 0) & (fraction < 1))
         peak, softening = peak_by_direction(bonds, gap)[partial], bonds.softening(gap)[partial]
@@ -486,13 +462,20 @@ class ShortRange:
 
     def bonds(self, fraction: np.ndarray) -> Bonds:
         """Return the law of every cell, with the work at the present fractions; only neighbours of contact attract."""
-        cells, length = np.flatnonzero(with_neighbours(fraction > 0)), self.adhesion_length
-        own = at_cells(length, cells)
-        by_own = own * average(fraction).ravel()[cells]
-        # Work and perimeter term follow from one energy, so a cell also has half of the works of its neighbours.
-        by_others = by_own if np.ndim(length) == 0 else average(length * fraction).ravel()[cells]
-        work = (1 - PERIMETER) * own + PERIMETER * (by_own + by_others)
+        cells = np.flatnonzero(with_neighbours(fraction > 0))
+        work = (1 - PERIMETER) * at_cells(self.adhesion_length, cells) + self._work_by_fractions(fraction).ravel()[
+            cells
+        ]
         return directed(LinearBonds(cells, work, np.sqrt(2 * BOND_COMPLIANCE * work)), self.ratio, self.before)
+
+    def _work_by_fractions(self, fraction):
+        """Return the part of the works of adhesion that the fractions cause, (n, n): the perimeter term.
+
+        Work and perimeter term follow from one energy, so a cell also has half of the works of its neighbours.
+        """
+        length = self.adhesion_length
+        by_own = length * average(fraction)
+        return PERIMETER * (by_own + (by_own if np.ndim(length) == 0 else average(length * fraction)))
 
     @property
     def straight_strength(self) -> float:
@@ -576,14 +559,13 @@ class ShortRange:
             closed[(row + offset[rows]) % grid, (column + offset[columns]) % grid] = True
         return closed
 
-    def tangent(self, bonds: Bonds, fraction: np.ndarray, gap: np.ndarray, grid: int) -> Tangent:
+    def tangent(self, bonds: Bonds, fraction: np.ndarray, gap: np.ndarray) -> Tangent:
         """Return the tangent of the law at given fractions and gaps, (k,)."""
         partial = (fraction > 0) & (fraction < 1)
         cells, ratio = np.asarray(bonds.cells)[partial], bonds.direction(gap)[partial]
         peak = peak_by_direction(bonds, gap)[partial]
-        length = np.broadcast_to(at_cells(self.adhesion_length, cells), cells.shape)
-        coupling = weights_between(cells, grid)
-        row = np.repeat(np.arange(len(cells)), np.diff(coupling.indptr))
-        change_of_work = PERIMETER * ratio[row] * (length[row] + length[coupling.indices])
-        coupling.data *= change_of_work / (BOND_COMPLIANCE * peak[row])
-        return Tangent(cells, fraction[partial], peak, bonds.softening(gap)[partial], coupling)
+
+        def peak_change(change):
+            return ratio * self._work_by_fractions(change).ravel()[cells] / (BOND_COMPLIANCE * peak)
+
+        return Tangent(cells, fraction[partial], peak, bonds.softening(gap)[partial], peak_change)

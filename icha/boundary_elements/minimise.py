@@ -142,19 +142,18 @@ def minimise(
         # Residual pressures; a cell is held closed under pressure, and where it is locked.
         is_open = now.gap > 0
         load = _load(space, control, now, is_open)
-        r, pressure, inside = now.force - load, problem.crop(now.pressure) + load, locked
+        r, pressure, inside = now.force - load, problem.crop(now.pressure), locked
         if law.holds_inside:
             inside = locked & ~(with_neighbours(is_open) | opened)
         held = ~is_open & (problem.crop(r) <= 0) | inside
         problem.crop(r)[held] = 0.0
-        largest = law.straight_strength or max(float(np.abs(pressure).max()), tolerance / _CALM)
-        error = float(np.abs(r).max()) / largest
+        error = _largest(r) / (law.straight_strength or max(_largest(pressure, load), tolerance / _CALM))
         if error <= _CALM:
             if law.holds_inside:
                 locked = ~with_neighbours(is_open)
             # Each cell closes, and opens, at most once, so that the number of changes is limited.
             closing = law.within_reach(now.gap, now.field)
-            opening, pending = inside & (pressure < -law.strength), len(closing)
+            opening, pending = inside & (pressure < -law.strength - load), len(closing)
             closing = closing[~closed.ravel()[closing]]
             if len(closing) or opening.any():
                 closed.ravel()[closing], opened, pending = True, opened | opening, pending - len(closing)
@@ -162,9 +161,11 @@ def minimise(
                 continue
         # Direction of steepest descent in the norm of the elastic energy, then conjugate to the last direction.
         z = space.displacement(r)
-        gap_error = float(np.abs(z).max())
-        if gap_error <= tolerance and error <= _CALM and _meets_load(control, pressure, r):
-            return Equilibrium(now.position, now.field, pressure, load, held, error, gap_error, pending, iteration)
+        gap_error = _largest(z)
+        if gap_error <= tolerance and error <= _CALM and _meets_load(control, pressure + load, r):
+            return Equilibrium(
+                now.position, now.field, pressure + load, load, held, error, gap_error, pending, iteration
+            )
         z = _restrict(z, held, control)
         d = _conjugate(z, r, last, held, control)
         # Step along the direction; a step that would raise the energy is shortened.
@@ -202,7 +203,7 @@ class _Point:
         for _ in range(problem.law.rounds):
             bonds = problem.law.bonds(bonds.field(bonds.fraction(bonds.at(gap)), gap.shape))
         force = -pressure
-        problem.crop(force)[...] -= bonds.field(bonds.tension(bonds.at(gap)), gap.shape)
+        problem.crop(force).flat[bonds.cells] -= bonds.tension(bonds.at(gap))
         return cls(position, gap, pressure, bonds, force)
 
     @property
@@ -285,14 +286,23 @@ class _Line:
 
         The energy falls by the mean residual times the change of position, and by what the mean tension leaves.
         """
-        now, problem, position = self.now, self.problem, self.now.position + length * self.d
+        now, problem, change = self.now, self.problem, length * self.d
+        position = now.position + change
         gap, cut = _project(problem, position, self.control)
-        pressure = problem.space.pressure(position) if cut else now.pressure + length * stiff_d
-        point, change = _Point.of(problem, position, gap, pressure, now.bonds), position - now.position
+        if cut:
+            pressure, change = problem.space.pressure(position), position - now.position
+        else:
+            pressure = now.pressure + length * stiff_d
+        point = _Point.of(problem, position, gap, pressure, now.bonds)
         r = point.force - _load(problem.space, self.control, point, None)
-        fall = 0.5 * np.vdot(self.r + r, change)
+        fall = 0.5 * (np.vdot(self.r, change) + np.vdot(r, change))
         fall -= now.bonds.energy_beyond_mean_tension(*map(now.bonds.at, (now.gap, gap, problem.crop(change))))
         return point, cut, float(np.vdot(r, self.d)), float(fall)
+
+
+def _largest(field, shift=0.0):
+    """Return the largest absolute value of a field with a shift."""
+    return max(float(field.max()) + shift, -float(field.min()) - shift)
 
 
 def _meets_load(control, pressure, r):
@@ -312,15 +322,19 @@ def _conjugate(z, r, last, held, control):
         return z
     direction, before, product = last
     share = max(0.0, float(np.vdot(r, z) - np.vdot(before, z)) / product)
-    d = _restrict(z + share * direction, held, control)
+    d = share * direction
+    d += z
+    d = _restrict(d, held, control)
     return d if np.vdot(r, d) > 0 else z
 
 
 def _restrict(change, held, control):
     """Set a change of the positions, (n, n), to zero where cells are held, (m, m), and keep a given mean; return it."""
-    change[: len(held), : len(held)][held] = 0.0
+    inside = change[: len(held), : len(held)]
+    np.copyto(inside, 0.0, where=held)
     if control.mean is not None:
-        change -= change.sum() / max(np.count_nonzero(~held), 1) * ~held
+        inside -= inside.sum() / max(held.size - np.count_nonzero(held), 1)
+        np.copyto(inside, 0.0, where=held)
     return change
 
 
@@ -330,12 +344,12 @@ def rates(problem: Problem, found: Equilibrium, accuracy: float) -> tuple[np.nda
     The separation is the mean of the positions or, on a free square, the rigid approach.
     """
     space, bonds, gap = problem.space, problem.law.bonds(found.fraction), problem.crop(found.position) - problem.heights
-    tangent = problem.law.tangent(bonds, bonds.at(found.fraction), bonds.at(gap), len(gap))
+    tangent = problem.law.tangent(bonds, bonds.at(found.fraction), bonds.at(gap))
     control = Control(rigid=0.0) if space.free else Control(mean=0.0)
 
     def stiffness(change, rigid=0.0):
         pressure = space.pressure(change)
-        problem.crop(pressure)[...] += tangent.field(tangent.changes(problem.crop(change))[1], gap.shape)
+        problem.crop(pressure)[...] += tangent.changes(problem.crop(change))[1]
         return pressure + (change.mean() - rigid) / space.mean_compliance if space.free else pressure
 
     def of_free_cells(operator):
@@ -357,7 +371,7 @@ def rates(problem: Problem, found: Equilibrium, accuracy: float) -> tuple[np.nda
         pressure += (change.mean() - 1) / space.mean_compliance
     else:
         pressure -= stiffness(change)[~found.held].mean()
-    return problem.crop(pressure), tangent.field(tangent.changes(problem.crop(change))[0], gap.shape)
+    return problem.crop(pressure), tangent.changes(problem.crop(change))[0]
 
 
 def _project(problem, position, control):

@@ -72,8 +72,8 @@ class PatchObservables:
         areas, gap = self.contact.area_of_cells(state), self.contact.gap(state)
         pressure, mean = self._pressure_density(state, areas)
 
-        def field(*values):
-            return self.contact.crop(self.contact.field(*values))
+        def field(values):
+            return self.contact.crop(self.contact.field(state.cells, values.astype(np.float32)))
 
         return {
             "overlap_fraction": 0.0,
@@ -81,8 +81,8 @@ class PatchObservables:
             "gap_density": self._gap_density(gap, state, areas),
             "pressure_density": pressure,
             "pressure_bin_mean": mean,
-            "contact_map": field(state.cells, np.where(areas > 0, state.fraction, 0.0), np.float32),
-            "contact_pressure": field(state.cells, state.pressure, np.float32),
+            "contact_map": field(np.where(areas > 0, state.fraction, 0.0)),
+            "contact_pressure": field(state.pressure),
             "gap_map": np.maximum(gap, 0.0).astype(np.float32),
             "displacement_map": self.contact.displacement(state).astype(np.float32),
             **self._patches(state, areas),

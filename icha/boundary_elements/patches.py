@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import label
 
-from icha.boundary_elements.cells import adjacent, find_among, mask_of
+from icha.boundary_elements.cells import adjacent, field_of, find_among
 from icha.contact.model import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, Events
 
 
@@ -76,7 +76,7 @@ def label_patches(cells: np.ndarray, grid: int) -> tuple[np.ndarray, int]:
 
     Cells that share an edge belong to the same patch, also across the periodic boundary.
     """
-    labels, count = label(mask_of(cells, (grid, grid)))
+    labels, count = label(field_of(cells, True, (grid, grid)))
     pairs = [
         np.stack([one, other], axis=1)[(one > 0) & (other > 0)]
         for one, other in ((labels[0], labels[-1]), (labels[:, 0], labels[:, -1]))
@@ -106,7 +106,7 @@ def labels_at(sought: np.ndarray, cells: np.ndarray, labels: np.ndarray) -> np.n
 
 def free_edges(cells: np.ndarray, grid: int) -> np.ndarray:
     """Count for each cell in contact, (k,), its edges (0 to 4) without a neighbour in contact."""
-    touching = mask_of(cells, (grid, grid)).ravel()
+    touching = field_of(cells, True, (grid, grid)).ravel()
     return 4.0 - np.count_nonzero(touching[adjacent(cells, grid)], axis=0)
 
 
