@@ -125,4 +125,6 @@ def _factor(title, name, unit, from_file):
         raise ValueError(f"column {title!r}: the unit is {unit!r}, but the heading states {other!r}; expected the same")
     if problem := problem_with_numbers(title, unit, si_unit):
         raise ValueError(f"column {title!r} {problem}")
+    if name == "contact_radius" and re.search("diam|durchmesser|ø|⌀", title.lower()):
+        raise ValueError(f"column {title!r}: expected contact radii; divide the diameters by 2, and change the heading")
     return factor

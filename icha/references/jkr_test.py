@@ -201,6 +201,11 @@ def _choose_points(points: Points, radius: float) -> tuple[np.ndarray, np.ndarra
             f"contact radius, {places[large[0]]}: {contact[large[0]]:.4g} m is not less than the radius of the lens, "
             f"{radius:.4g} m. Check the units, and that the column contains radii, not diameters or areas"
         )
+    if points.unloading is None and (again := _second_loading(force)) is not None:
+        raise ValueError(
+            f"{places[again]}: the force rises for the second time; expected one loading and one unloading. Select the "
+            "points of one cycle"
+        )
     unloading = np.arange(len(force)) > top if points.unloading is None else points.unloading
     if contact is not None:
         left_out = np.where(contact == 0, "without contact", "").astype(object)
@@ -217,6 +222,14 @@ def _choose_points(points: Points, radius: float) -> tuple[np.ndarray, np.ndarra
     if constant := [quantity for quantity, column in values.items() if not np.ptp(column[kept]) > 0]:
         raise ValueError(f"column of {constant[0]}: all values are the same; expected measured values")
     return left_out, unloading
+
+
+def _second_loading(force):
+    """Return the first point of a second loading, with more than half the largest force; None without one."""
+    high, low = force > 0.5 * force.max(), force < 0.25 * force.max()
+    end = np.argmax(high) + np.flatnonzero(low[np.argmax(high) :])
+    again = end[0] + np.flatnonzero(high[end[0] :]) if end.size else end
+    return int(again[0]) if again.size else None
 
 
 def _without_contact(force, unloading):

@@ -184,6 +184,7 @@ def test_points_of_another_law_have_correlated_residuals():
             "has no column for contact radius or indentation among force (mN), area (um^2)",
         ),
         ("a (um),t\n2,1\n", "has no column for force"),
+        ("force (mN),a in diameters (um)\n1,2\n", "expected contact radii; divide the diameters by 2"),
         ("force (mN),load (N),a (um)\n1,2,3\n", "has several columns for force: force (mN), load (N); choose one"),
         ("force (mN) x 10,a (um)\n1,2\n", "contains a factor"),
         (
@@ -196,6 +197,7 @@ def test_points_of_another_law_have_correlated_residuals():
             "has 2 points of loading and 0 of unloading with contact; expected at least 3",
         ),
         ("force (mN),a (um)\n3,100\n2,90\n1,80\n0,70\n", "has 1 point of loading and 3 of unloading with contact"),
+        ("force (mN),a (um)\n1,10\n4,20\n-1,5\n3,15\n-1,5\n", "line 5: the force rises for the second time"),
         ("force (mN),a (um)\n1,10\n2,10\n3,10\n4,10\n", "contact_radius: all values are the same"),
         ("force (mN),a (um),branch\n1,10,loading\n2,20,hold\n", "column 'branch', line 3: 'hold'; expected loading or"),
     ],
