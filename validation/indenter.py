@@ -40,8 +40,13 @@ PARTS: Parts = {
     "smooth_loop": (rough.smooth_loop, [()]),
     "direction": (
         rough.directed_sphere,
-        [(1 / 4, 3, 3.0), (1 / 5, 3, 3.0), (1 / 4, 10, 3.0), (1 / 5, 10, 3.0), (1 / 4, 10, 4.0)],
+        [(spacing, *others) for others, spacing in product(((3, 3.0), (10, 3.0), (10, 4.0)), (1 / 4, 1 / 5, None))],
     ),
+    "front": (
+        single.pinned_front,
+        [(cells, *others) for others, cells in product(((2, 0), (4, 0), (8, 0), (2, 3.0)), (16, 32, 48))],
+    ),
+    "pinning": (single.pinning, [(0.1,), (0.2,), (0.4,), (0.6,), (0.8,), (1.2,)]),
 }
 
 
@@ -125,10 +130,13 @@ _BY_ROW = {
         unloading_indentation: unloading, δ .3f; pull_off: pull-off .3f; loss_over_area: loss/(Δγ A) .3f""",
     "convergence": """grid: grid g; wave_cells: cells in the shortest wave g; steps: equilibria g;
         pull_off: pull-off .4f; loss: loss .3f; largest_area: largest area .3f; seconds: time in s .1f""",
-    "direction": """ratio: ratio of works g; cells: cells in the radius .3g; kind: pull-off of s;
+    "direction": """ratio: ratio of works g; model: model s; cells: cells in the radius .3g; kind: pull-off of s;
         advancing: advancing work .1%; standing: standing radius .1%; stiffness: stiffness 2E*a .1%;
         receding: receding work .1%; pull_off: pull-off %; front: front dissipation %;
         unattributed: unattributed loss .2%""",
+    "front": """work: work of adhesion s; waves: waves of the front g; cells: cells in the radius g;
+        shift: shift in cells .3f; error: error of the shift %""",
+    "pinning": "contrast: contrast g; seed_1: seed 1 .4f; seed_2: seed 2 .4f; seed_3: seed 3 .4f",
 }
 _by_radius = partial(
     by_radius, edges=(4, 8, 12), places={"general": single.PLACES[::3], "node, middle": single.PLACES[1:3]}

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import gamma
 
+from icha.asperity.adhesion_map import Patches
 from icha.asperity.material import Material
 from icha.boundary_elements.contact import BoundaryElements, contact_of
 from icha.contact.model import PRESSURE, Control
@@ -354,11 +355,7 @@ def ripples_along(cells: float, waves: int, indentation: float = 2.0) -> dict:
     for sign in (1, -1):
         contact = indenter(_Ripples(sign * amplitude, waves, a / 2), grid, spacing)
         state = contact.equilibrium(contact.untouched(), -indentation)
-        row, column = np.divmod(state.cells, contact.space.grid)
-        offset = grid // 2 + PLACES[0][0]
-        phi = np.arctan2(row - offset, column - offset)
-        moment = np.sum(contact.area_of_cells(state) * np.cos(waves * phi)) * spacing**2
-        shifts.append(moment / (math.pi * a))
+        shifts.append(_wave_of_front(contact, state, waves, a))
     found = -stiffness * (shifts[0] - shifts[1]) / 2
     # The same ripples under a circular contact: p with K = (m + 1) c E* h/sqrt(pi a), c = int t^(m+1)/sqrt(1 - t^2).
     c = math.sqrt(math.pi) / 2 * gamma(waves / 2 + 1) / gamma(waves / 2 + 1.5)
@@ -371,6 +368,77 @@ def ripples_along(cells: float, waves: int, indentation: float = 2.0) -> dict:
         "error": found / circle - 1,
         "straight_error": found / straight - 1,
     }
+
+
+def _wave_of_front(contact, state, waves, radius):
+    """Return the amplitude of cos(m phi) of the front of a state near a circle, m; waves: m."""
+    row, column = np.divmod(state.cells, contact.space.grid)
+    offset = len(contact.crop(contact.heights)) // 2 + PLACES[0][0]
+    wave = np.cos(waves * np.arctan2(row - offset, column - offset))
+    return np.sum(contact.area_of_cells(state) * wave) * contact.spacing**2 / (math.pi * radius)
+
+
+def pinned_front(cells: float, waves: int, width: float = 0.0, contrast: float = 0.1, indentation: float = 2.0) -> dict:
+    """Return how far the front of a sphere moves with a work of adhesion that differs from place to place.
+
+    To first order, the amplitude w_m of cos(m phi) of the work of adhesion along the circle of contact moves the front
+    by w_m/(G' + m G/a). G' is the derivative of the energy release rate G with respect to the radius a, at fixed
+    indentation (H. Gao and J. R. Rice, J. Appl. Mech. 54 (1987) 627; A. Sanner and L. Pastewka, J. Mech. Phys. Solids
+    160 (2022) 104781, doi:10.1016/j.jmps.2022.104781). The effect of the grid cancels between opposite contrasts.
+
+    Parameters
+    ----------
+    waves : m, waves of the work of adhesion around the contact; with stripes, the wave of the front that is measured.
+    width : width of stripes, one of which is centred at the apex, m; 0 for waves around the apex.
+    contrast : largest deviation of the work of adhesion from its mean 1.
+    """
+    a = float(exact.sphere_radius_at_indentation(indentation, 1.0, 1.0, 1.0))
+    spacing, grid = a / cells, 2 * math.ceil(1.25 * cells)
+
+    def pattern(x, y):
+        return np.sign(np.cos(math.pi * x / width)) if width else np.cos(waves * np.arctan2(y, x))
+
+    phi = 2 * math.pi * (np.arange(10_000) + 0.5) / 10_000
+    along = contrast * 2 * np.mean(pattern(a * np.cos(phi), a * np.sin(phi)) * np.cos(waves * phi))
+    # G = E* (a^2/R - delta)^2/(2 pi a), and the work of adhesion is 1.
+    first_order = along / (2 / math.pi * math.sqrt(2 * math.pi * a) - 1 / a + waves / a)
+    x = (np.arange(grid) - grid // 2 - PLACES[0][0]) * spacing
+    shifts = []
+    for sign in (1, -1):
+        contact = indenter(
+            Paraboloid((1.0, 1.0)), grid, spacing, Material(1.0, 1 + sign * contrast * pattern(*np.meshgrid(x, x)), 0.2)
+        )
+        state = contact.equilibrium(contact.untouched(), -indentation)
+        shifts.append(_wave_of_front(contact, state, waves, a))
+    shift = (shifts[0] - shifts[1]) / 2
+    what = f"stripes of {width:g}" if width else "waves"
+    row = {"work": what, "waves": waves, "cells": cells, "contrast": contrast}
+    return row | {"shift": shift / spacing, "error": shift / first_order - 1}
+
+
+def pinning(contrast: float, seeds: Sequence[int] = (1, 2, 3), cells: int = 24) -> dict:
+    """Return the hysteresis by pinning alone: of a sphere on random patches, between its jumps into and out of contact.
+
+    The indentation grows from 1 to 3 and falls to 1 again. The hysteresis is the mean difference of the force between
+    both, over the pull-off force. The correlation length of the patches is four cells.
+
+    Parameters
+    ----------
+    contrast : standard deviation of the work of adhesion, whose mean is 1.
+    cells : cells in the radius of the contact at the largest indentation.
+    """
+    depths, found = np.linspace(1.0, 3.0, 21), {}
+    spacing = float(exact.sphere_radius_at_indentation(depths[-1], 1.0, 1.0, 1.0)) / cells
+    for seed in seeds:
+        material = Material(1.0, Patches(1.0, contrast, 4 * spacing, seed), 0.2)
+        contact = indenter(Paraboloid((1.0, 1.0)), 2 * math.ceil(1.3 * cells), spacing, material)
+        state, forces = contact.untouched(), []
+        for depth in (*depths, *depths[-2::-1]):
+            state = contact.equilibrium(state, -float(depth))
+            forces.append(force_and_area(contact, state)[0])
+        loading, unloading = forces[: len(depths)], forces[: -len(depths) - 1 : -1]
+        found[f"seed_{seed}"] = float(np.mean(np.subtract(loading, unloading))) / PULL_OFF
+    return {"contrast": contrast} | found
 
 
 def ripples_across(spacing: float, amplitude: float, wavelength: float) -> dict:

@@ -23,6 +23,7 @@ from icha.references.indentation import sphere_contact, sphere_pull_off
 from icha.references.jkr_fits import fit_work_of_adhesion
 from icha.surfaces.shapes import Paraboloid
 from validation.indenter_contacts import ADHESIVE, BARE, PULL_OFF
+from validation.surfaces import paraboloid
 
 ROOT = File(__file__).resolve().parents[1]
 # ContactMechanics is installed there by `make .venv-benchmarks/.installed`.
@@ -95,18 +96,29 @@ def smooth_loop(grid: int = 96) -> dict:
     return _timed_loop(Surface(np.zeros((grid, grid)), grid / 6, "free", Paraboloid((1.0, 1.0))), 4.0)[0]
 
 
-def directed_sphere(spacing: float, ratio: float, radius: float, grid: int = 64) -> dict:
+def directed_sphere(spacing: float | None, ratio: float, radius: float, grid: int = 64) -> dict:
     """Return the errors of a loop of a smooth sphere whose front recedes at a larger work of adhesion than it advances.
 
     Without load, the front would advance to a radius of about 1.8. The largest tension is that of JKR with the receding
     work or, if the contact is smaller than there, that of a punch of the largest radius.
 
-    spacing, ratio, radius : cell size, receding over advancing work, and contact radius at the largest load.
+    spacing : cell size; None for the asperity model, with one sphere in a periodic cell, whose stiffness is not
+        compared because it depends on the images.
+    ratio, radius : receding over advancing work, and contact radius at the largest load.
     """
-    surface = Surface(np.zeros((grid, grid)), grid * spacing, "free", Paraboloid((1.0, 1.0)))
-    run = follow(surface, Material(1.0, (1.0, ratio), 0.2), float(sphere_contact(radius, 1.0, 1.0, 1.0).indentation))
-    area = run.contact_area_fraction.values * surface.period**2
-    a, force, turn = np.sqrt(area / math.pi), run.force.values, int(np.argmax(area))
+    material = Material(1.0, (1.0, ratio), 0.2)
+    if spacing:
+        surface = Surface(np.zeros((grid, grid)), grid * spacing, "free", Paraboloid((1.0, 1.0)))
+        run = follow(surface, material, float(sphere_contact(radius, 1.0, 1.0, 1.0).indentation))
+    else:
+        surface = paraboloid(grid, 40.0, 0.29)
+        path = Path(area_fractions=[math.pi * (radius / surface.period) ** 2], unload=True)
+        run = simulate(surface, material, path, model="asperities")
+    area, force, stiffness = (
+        run[name].values * surface.period**2
+        for name in ("contact_area_fraction", "nominal_pressure", "contact_stiffness")
+    )
+    a, turn = np.sqrt(area / math.pi), int(np.argmax(area))
     with np.errstate(divide="ignore", invalid="ignore"):
         rate = (4 / 3 * a**3 - force) ** 2 / (8 * math.pi * a**3)
     loads, stands = slice(1, turn + 1), (run.leg == 1).values & (rate > 1.1) & (rate < 0.5 * (1 + ratio))
@@ -117,13 +129,14 @@ def directed_sphere(spacing: float, ratio: float, radius: float, grid: int = 64)
     front = (ratio - 1) * area[turn] / surface.period**2
     return {
         "ratio": ratio,
-        "cells": a[turn] / spacing,
+        "model": "boundary elements" if spacing else "asperities",
+        "cells": a[turn] / spacing if spacing else None,
         "kind": "JKR" if sphere_pull_off(1.0, 1.0, ratio).contact_radius < a[turn] else "punch",
         "advancing": float(np.abs(rate[loads] - 1).max()),
         "standing": float(np.abs(a[stands] / a[turn] - 1).max()),
-        "stiffness": float(np.abs(run.stiffness.values[stands] / (2 * a[turn]) - 1).max()),
+        "stiffness": float(np.abs(stiffness[stands] / (2 * a[turn]) - 1).max()) if spacing else None,
         "receding": float(np.abs(rate[recedes] / ratio - 1).max()) if recedes.any() else math.nan,
-        "pull_off": float(run.pull_off_force) / largest - 1,
+        "pull_off": -force.min() / largest - 1,
         "front": float(run.front_dissipation) / front - 1,
         "unattributed": float(abs(run.loss_unattributed) / run.hysteresis_loss),
     }

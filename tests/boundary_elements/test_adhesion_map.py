@@ -6,6 +6,7 @@ import pytest
 from icha import Material, Patches, Path, SelfAffineSpectrum, Stripes, Surface, simulate
 from icha.boundary_elements.contact import contact_of
 from icha.surfaces.shapes import Sphere
+from validation.indenter_contacts import pinned_front
 
 MODULUS, RADIUS, ENERGY, SIDE = 2e6, 1e-3, 0.03, 4e-4
 GRID = 48
@@ -56,6 +57,12 @@ def test_contrast_adds_hysteresis_and_direction_adds_to_both():
     assert losses[1] > 1.01 * losses[0]
     run = loop((Patches(ENERGY, 0.005, 4e-5, 1), 3 * ENERGY))
     assert float(run["front_dissipation"]) > 1.9 * ENERGY * float(run["largest_contact_area_fraction"])
+
+
+@pytest.mark.parametrize(("waves", "width"), [(3, 0), (2, 3.0)])
+def test_the_front_moves_as_by_the_first_order_of_a_crack_front(waves, width):
+    row = pinned_front(24, waves, width)
+    assert abs(row["error"]) < 0.03 and abs(row["shift"]) > 0.25
 
 
 def test_the_energy_of_a_state_is_right_to_its_slope():
