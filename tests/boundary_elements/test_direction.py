@@ -106,7 +106,7 @@ def test_two_equal_values_are_one_value():
         Material(MODULUS, (0.1, 0.2, 0.3))
 
 
-@pytest.mark.parametrize("interaction_range", [1e-9, 1e-6])
+@pytest.mark.parametrize("interaction_range", [pytest.param(1e-9, marks=pytest.mark.slow), 1e-6])
 def test_fronts_of_a_rough_surface_dissipate_at_a_short_and_at_a_finite_range(interaction_range):
     surface = SelfAffineSpectrum(100e-6, 50e-6, 100e-6 / 6, 0.8, 0.35).realise(48, 1)
     material = Material(MODULUS, (ADVANCING, 2 * ADVANCING), interaction_range=interaction_range)

@@ -131,6 +131,7 @@ def test_every_run_of_both_models_is_taken_out_unchanged(runs):
         select_run(tree, labels("other"))
 
 
+@pytest.mark.slow
 def test_asperities_end_at_the_limit_of_their_range_beside_boundary_elements(tmp_path):
     path = icha.Path([0.05, 0.1, 0.3], unload=True, snapshots=[("reduced_pressure", 0.3)])
     whole = icha.simulate(small.surface(1), small.MATERIALS["hertz"], path, model=REFERENCE_MODEL, seed=1)

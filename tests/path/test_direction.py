@@ -98,7 +98,7 @@ def test_one_work_is_the_limit_of_two():
         assert float(runs[2][name]) == pytest.approx(float(runs[0][name]), rel=1e-4)
 
 
-@pytest.mark.parametrize("control", ["separation", "load"])
+@pytest.mark.parametrize("control", [pytest.param("separation", marks=pytest.mark.slow), "load"])
 def test_a_rough_surface_loses_what_its_fronts_dissipate_and_its_jumps(control):
     surface, material = few.small()
     work = material.surface_energy
@@ -117,6 +117,7 @@ def test_a_rough_surface_loses_what_its_fronts_dissipate_and_its_jumps(control):
     assert abs(float(run.loss_unattributed)) < 0.01 * scale
 
 
+@pytest.mark.slow
 def test_spots_unite_split_and_separate_at_two_works():
     surface, material = few.small()
     work = material.surface_energy
