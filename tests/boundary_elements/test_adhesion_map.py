@@ -46,12 +46,14 @@ def test_a_uniform_map_is_one_work_of_adhesion():
     assert by_map.attrs["adhesion_map"].startswith("NodeValues")
 
 
+@pytest.mark.slow
 def test_stripes_along_x_and_along_y_are_the_same_contact():
     x, y = (loop(Stripes(0.02, 0.04, SIDE / 16, along)) for along in ("x", "y"))
     np.testing.assert_allclose(x["hysteresis_loss"], y["hysteresis_loss"], rtol=1e-6)
     assert float(x["surface_energy"]) == pytest.approx(0.03)
 
 
+@pytest.mark.slow
 def test_contrast_adds_hysteresis_and_direction_adds_to_both():
     losses = [float(loop(energy)["hysteresis_loss"]) for energy in (ENERGY, Stripes(0.018, 0.042, SIDE / 16))]
     assert losses[1] > 1.01 * losses[0]
