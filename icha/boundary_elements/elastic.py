@@ -12,8 +12,8 @@ There are three kinds. Each multiplies the Fourier modes of a field by factors:
   `layer_correction`), on a grid of twice the side. Cells outside the square carry no pressure. So the periodic images
   of the larger grid have no effect in the square.
 
-A rigid displacement of the whole grid causes no pressure: `pressure` leaves the mean mode out. On a free square, the
-rigid approach follows from the mean displacement and the mean pressure (`HalfSpace.mean_compliance`).
+A rigid displacement of the whole grid causes no pressure, unless the rigid approach of a free square is given. The
+approach follows from the mean displacement and the mean pressure (`HalfSpace.mean_compliance`).
 """
 
 from __future__ import annotations
@@ -73,9 +73,15 @@ class HalfSpace:
         """
         return float(self._compliance[0, 0]) if self.free else 0.0
 
-    def pressure(self, displacement: np.ndarray) -> np.ndarray:
-        """Return the pressure, (n, n), that causes a displacement, (n, n); the mean pressure is zero."""
-        return multiply_modes(displacement, self._stiffness)
+    def pressure(self, displacement: np.ndarray, rigid: float | None = None) -> np.ndarray:
+        """Return the pressure, (n, n), that causes a displacement, (n, n).
+
+        Its mean is zero or, with a given rigid approach of a free square, follows from the mean displacement.
+        """
+        pressure = multiply_modes(displacement, self._stiffness)
+        if rigid is not None:
+            pressure += (displacement.mean() - rigid) / self.mean_compliance
+        return pressure
 
     def displacement(self, pressure: np.ndarray) -> np.ndarray:
         """Return the displacement, (n, n), under a pressure, (m, m), m <= n; the other cells carry no pressure.

@@ -23,7 +23,7 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, minres
 
 from icha.boundary_elements.elastic import HalfSpace
-from icha.boundary_elements.laws import AtDistance, Bonds, ShortRange, with_neighbours
+from icha.boundary_elements.laws import TOUCHING, AtDistance, Bonds, ShortRange, with_neighbours
 from icha.boundary_elements.window import Window
 from icha.contact.model import NotConverged
 
@@ -44,14 +44,13 @@ _LEAST_CURVATURE = 0.01
 _LOAD_ERROR, _LEAST_LOAD = 1e-7, 1e-4
 # Relative error of a given mean position that counts as rounding.
 _SAME_MEAN = 1e-12
-_TINY = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True)
 class Control:
-    """What is given: a load per cell in E*, or the mean of the positions, or the rigid approach (free squares)."""
+    """What is given: the mean of the positions, or the rigid approach (free squares), else a load per cell in E*."""
 
-    load: float | None = None
+    load: float = 0.0
     mean: float | None = None
     rigid: float | None = None
 
@@ -141,7 +140,7 @@ def minimise(
     for iteration in range(_MOST):
         # Residual pressures; a cell is held closed under pressure, and where it is locked.
         is_open = now.gap > 0
-        load = _load(space, control, now, is_open)
+        load = _load(control, now, is_open)
         r, pressure, inside = now.force - load, problem.crop(now.pressure), locked
         if law.holds_inside:
             inside = locked & ~(with_neighbours(is_open) | opened)
@@ -163,9 +162,8 @@ def minimise(
         z = space.displacement(r)
         gap_error = _largest(z)
         if gap_error <= tolerance and error <= _CALM and _meets_load(control, pressure + load, r):
-            return Equilibrium(
-                now.position, now.field, pressure + load, load, held, error, gap_error, pending, iteration
-            )
+            pressure, load = pressure + load, load + float(now.pressure.mean())
+            return Equilibrium(now.position, now.field, pressure, load, held, error, gap_error, pending, iteration)
         z = _restrict(z, held, control)
         d = _conjugate(z, r, last, held, control)
         # Step along the direction; a step that would raise the energy is shortened.
@@ -185,7 +183,7 @@ def minimise(
 class _Point:
     """Position of the surface of the body, and what follows from it.
 
-    position, pressure : (n, n), positions, and pressures without the load.
+    position, pressure : (n, n), positions, and pressures without a load that is given, or that keeps a mean position.
     gap : (m, m), gaps.
     bonds : attraction of the cells.
     force : (n, n), minus pressure and tension: without load, it opens a gap if it is positive.
@@ -216,7 +214,9 @@ def _start(problem, position, fraction, control):
     """Return the point from which the iteration starts."""
     position = position.copy()
     gap, _ = _project(problem, position, control)
-    return _Point.of(problem, position, gap, problem.space.pressure(position), problem.law.bonds(fraction))
+    return _Point.of(
+        problem, position, gap, problem.space.pressure(position, control.rigid), problem.law.bonds(fraction)
+    )
 
 
 def _with_contact(problem, control, point, cells):
@@ -246,12 +246,13 @@ class _Line:
         The first length is that of Newton with constant works of adhesion; the second one follows from the residuals at
         the first. If both raise the energy, the length becomes shorter.
         """
-        stiff_d, slope = self.problem.space.pressure(self.d), float(np.vdot(self.r, self.d))
+        rigid = None if self.control.rigid is None else 0.0
+        stiff_d, slope = self.problem.space.pressure(self.d, rigid), float(np.vdot(self.r, self.d))
         # Without contact there may be no stiffness: at most the largest gap closes.
         longest = np.inf
         if self.now.gap.min() > 0:
             largest_gap = np.max(self.now.gap, where=self.now.gap < np.inf, initial=0.0)
-            longest = float(largest_gap) / max(-float(self.problem.crop(self.d).min()), _TINY)
+            longest = float(largest_gap) / max(-float(self.problem.crop(self.d).min()), TOUCHING)
         curvature = self._curvature(stiff_d)
         length = slope / curvature if curvature * longest > slope else longest
         if not length < np.inf:
@@ -275,8 +276,6 @@ class _Line:
     def _curvature(self, stiff_d):
         """Return the curvature of the energy along d with constant works, or that of the elastic energy."""
         bonds, d, stiffness = self.now.bonds, self.d, np.vdot(self.d, stiff_d)
-        if self.control.rigid is not None:
-            stiffness += d.sum() ** 2 / d.size / self.problem.space.mean_compliance
         change = bonds.at(self.problem.crop(d))
         curvature = stiffness - np.sum(bonds.softening(bonds.at(self.now.gap)) * change**2)
         return float(curvature if curvature > _LEAST_CURVATURE * stiffness else stiffness)
@@ -290,11 +289,11 @@ class _Line:
         position = now.position + change
         gap, cut = _project(problem, position, self.control)
         if cut:
-            pressure, change = problem.space.pressure(position), position - now.position
+            pressure, change = problem.space.pressure(position, self.control.rigid), position - now.position
         else:
             pressure = now.pressure + length * stiff_d
         point = _Point.of(problem, position, gap, pressure, now.bonds)
-        r = point.force - _load(problem.space, self.control, point, None)
+        r = point.force - _load(self.control, point, None)
         fall = 0.5 * (np.vdot(self.r, change) + np.vdot(r, change))
         fall -= now.bonds.energy_beyond_mean_tension(*map(now.bonds.at, (now.gap, gap, problem.crop(change))))
         return point, cut, float(np.vdot(r, self.d)), float(fall)
@@ -307,7 +306,7 @@ def _largest(field, shift=0.0):
 
 def _meets_load(control, pressure, r):
     """Return whether the residuals r change a given load by little."""
-    if control.load is None:
+    if control.mean is not None or control.rigid is not None:
         return True
     load = max(abs(control.load) * r.size, _LEAST_LOAD * float(np.abs(pressure).sum()))
     return abs(float(r.sum())) <= _LOAD_ERROR * load
@@ -347,10 +346,10 @@ def rates(problem: Problem, found: Equilibrium, accuracy: float) -> tuple[np.nda
     tangent = problem.law.tangent(bonds, bonds.at(found.fraction), bonds.at(gap))
     control = Control(rigid=0.0) if space.free else Control(mean=0.0)
 
-    def stiffness(change, rigid=0.0):
-        pressure = space.pressure(change)
+    def stiffness(change, control=control):
+        pressure = space.pressure(change, control.rigid)
         problem.crop(pressure)[...] += tangent.changes(problem.crop(change))[1]
-        return pressure + (change.mean() - rigid) / space.mean_compliance if space.free else pressure
+        return pressure
 
     def of_free_cells(operator):
         def restricted(change):
@@ -363,13 +362,12 @@ def rates(problem: Problem, found: Equilibrium, accuracy: float) -> tuple[np.nda
     start = _restrict(np.ones(found.position.shape), found.held, Control())
     if not space.free:
         start /= start.mean()
-    force = _restrict(-stiffness(start, 1.0), found.held, control)
+    moved = Control(rigid=1.0) if space.free else control
+    force = _restrict(-stiffness(start, moved), found.held, control)
     change, _ = minres(of_free_cells(stiffness), force.ravel(), M=of_free_cells(space.displacement), rtol=accuracy)
     change = start + change.reshape(start.shape)
-    pressure = space.pressure(change)
-    if space.free:
-        pressure += (change.mean() - 1) / space.mean_compliance
-    else:
+    pressure = space.pressure(change, moved.rigid)
+    if not space.free:
         pressure -= stiffness(change)[~found.held].mean()
     return problem.crop(pressure), tangent.changes(problem.crop(change))[0]
 
@@ -392,13 +390,12 @@ def _project(problem, position, control):
     return gap, cut
 
 
-def _load(space, control, point, is_open):
-    """Return the mean pressure of the grid, in E*: given, or by the rigid approach, or the mean force of open cells.
+def _load(control, point, is_open):
+    """Return the load per cell, in E*: given, or the mean force of open cells if the mean position is given.
 
-    With a given mean position, the load has no effect on the energy, and is 0 if `is_open` is None.
+    With a given mean position, the load has no effect on the energy, and is 0 if `is_open` is None. A rigid approach
+    needs no load.
     """
-    if control.load is not None:
+    if control.mean is None:
         return control.load
-    if control.rigid is not None:
-        return float(point.position.mean() - control.rigid) / space.mean_compliance
     return float(point.force[is_open].mean()) if is_open is not None and is_open.any() else 0.0
