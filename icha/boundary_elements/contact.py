@@ -59,9 +59,9 @@ _LONGEST, _SAME_SEPARATION, _ZERO_LOAD = 0.1, 1e-13, 1e-2
 _GAP_ERROR = 5e-9
 # Distance of untouched surfaces over the range of attraction: a little more, so that rounding leaves no attraction.
 _BEYOND_REACH = 1 + 1e-6
-# Largest relative residual of the rates of a state. Where fronts stand, their bonds are stiff springs, and the error is
-# some hundred times the residual.
-_RATE_ERROR, _RATE_ERROR_OF_SPRINGS = MODELS[REFERENCE_MODEL].stiffness_error, 1e-6
+# Largest relative residual of the rates of a state. Where fronts stand, their bonds are stiff springs, and the error of
+# the stiffness is up to 20 000 times the residual.
+_RATE_ERROR, _RATE_ERROR_OF_SPRINGS = MODELS[REFERENCE_MODEL].stiffness_error, 1e-9
 # Least energy to which errors of the work in a loop are relative, in units of `surface_energy` times A0.
 _SMALLEST_WORK = 1e-3
 
