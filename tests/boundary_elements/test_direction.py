@@ -70,6 +70,8 @@ def test_a_sphere_advances_stands_and_recedes(sphere):
     np.testing.assert_allclose(a[stands], a.max(), rtol=1e-6)
     # The stiffness of a flat punch, 2 E* a.
     np.testing.assert_allclose(run["stiffness"].values[stands], 2 * MODULUS * a.max(), rtol=0.01)
+    force, depth = (run[name].values[stands] for name in ("force", "indentation"))
+    np.testing.assert_allclose(np.diff(force) / np.diff(depth), run["stiffness"].values[stands][1:], rtol=1e-6)
     recedes = touching & (leg == 1) & (a < 0.95 * a.max())
     np.testing.assert_allclose(rate[recedes], 3.0, rtol=0.02)
 
