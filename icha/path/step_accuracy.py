@@ -114,32 +114,23 @@ class StepAccuracy:
     def locate_largest_tension(self, start, state, step):
         """Return the separation at which the tension is largest between two states, m, or None.
 
-        The tangents at both states meet at an estimate of the largest tension. The separation is at the minimum of the
-        cubic polynomial with the pressures and slopes of both states, or without a minimum where the tangents meet.
+        It is the minimum of the cubic polynomial with the pressures and slopes of both states. The tangents at both
+        states are no bound of the tension, because the pressure may jump without an event.
         Return None on loading, from or to full contact, with events that may change the pressure, or if the tension has
         no maximum between the states. Also return None if the tension was larger earlier on the path, or if the tension
-        in one of the two states equals the estimate within the required accuracy.
+        in one of the two states equals the largest tension within the required accuracy.
         """
-        contact = self.contact
+        contact, du = self.contact, step.separation_change
         slope, end_slope = (-contact.stiffness(each) for each in (start, state))
         # Full contact is infinitely stiff. Its tension is largest when the first gap opens, in a state of the path.
-        if step.separation_change < 0 or step.may_change_pressure or not -np.inf < slope < 0 < end_slope:
+        if du < 0 or step.may_change_pressure or not -np.inf < slope < 0 < end_slope:
             return None
         p, q = (contact.pressure(each) for each in (start, state))
-        # The tangents meet below the curve, so this tension is an upper bound.
-        meet = (q - end_slope * step.separation_change - p) / (slope - end_slope)
-        lowest = p + slope * meet
+        # The cubic is p + s t + b t^2 + a t^3/3 with 0 < t < 1. Its slope has one zero with a change from - to +.
+        s, e = slope * du, end_slope * du
+        a, b = 3 * (s + e - 2 * (q - p)), 3 * (q - p) - 2 * s - e
+        t = -s / (b + np.sqrt(b * b - a * s))
+        lowest = p + t * (s + t * (b + t * a / 3))
         if lowest >= self.lowest_pressure or min(p, q) - lowest <= contact.path_accuracy.tension * abs(lowest):
             return None
-        lowest_at = _minimum_of_cubic(step.separation_change, (p, q), (slope, end_slope))
-        return start.separation + (meet if lowest_at is None else lowest_at)
-
-
-def _minimum_of_cubic(length, values, slopes):
-    """Return the position of the minimum of a cubic with values and slopes (-, +) at 0 and `length`, or None."""
-    # The import takes long, and loading does not need it.
-    from scipy.interpolate import CubicHermiteSpline
-
-    curve = CubicHermiteSpline([0.0, length], values, slopes)
-    stationary = [u for u in curve.derivative().roots(extrapolate=False) if 0 < u < length]
-    return min(stationary, key=curve, default=None)
+        return start.separation + t * du

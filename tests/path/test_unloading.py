@@ -5,16 +5,20 @@ unless a test has another period.
 """
 
 from itertools import pairwise
+from types import SimpleNamespace
 
 import few_asperities as few
 import numpy as np
 import pytest
 from half_space import periodic_point_load
+from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
 import icha
 from icha import Material, Path
 from icha.contact.model import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, events_between
+from icha.contact.models import PathAccuracy
+from icha.path.step_accuracy import StepAccuracy
 from icha.path.targets import LOAD_CONTROL
 from icha.surfaces.summits import find_summits
 from validation.surfaces import paraboloid
@@ -45,6 +49,26 @@ def test_the_largest_tension_of_one_asperity_is_found():
     weakest = min((w for w in waypoints if w.leg == 1), key=lambda w: few.load(contact, w))
     assert few.load(contact, weakest) == pytest.approx(-1.5 * np.pi, rel=1e-7)
     assert few.HEIGHT - weakest.state.separation == pytest.approx(few.PULL_OFF_APPROACH, abs=1e-3)
+
+
+@pytest.mark.parametrize("p, q, slope, end_slope", [(-2.4, -0.95, -43.2, 18.1), (-2.4, -2.5, -43.2, 50.0)])
+def test_the_largest_tension_between_two_states_is_that_of_their_cubic(p, q, slope, end_slope):
+    """Also if a front hops, so that the pressure jumps without an event, and the tangents meet outside the step."""
+    length = 0.075
+    start, end = (
+        SimpleNamespace(separation=u, pressure=f, slope=k) for u, f, k in ((1, p, slope), (1 + length, q, end_slope))
+    )
+    contact = SimpleNamespace(
+        pressure=lambda state: state.pressure, stiffness=lambda state: -state.slope, path_accuracy=PathAccuracy()
+    )
+    step = SimpleNamespace(separation_change=length, may_change_pressure=False)
+    found = StepAccuracy(contact, 0.15, lowest_pressure=-2.3).locate_largest_tension(start, end, step)
+    curve = CubicHermiteSpline([0, length], [p, q], [slope, end_slope])
+    (lowest,) = [u for u in curve.derivative().roots(extrapolate=False) if curve(u, 2) > 0]
+    assert found - 1 == pytest.approx(lowest, rel=1e-9)
+    assert curve(lowest) < min(p, q)
+    # It is no larger than an earlier tension.
+    assert StepAccuracy(contact, 0.15, lowest_pressure=-5.0).locate_largest_tension(start, end, step) is None
 
 
 def test_a_load_falls_on_no_load_and_breaks_contact_at_the_largest_tension():
