@@ -28,12 +28,16 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from icha.boundary_elements.cells import field_of
 from icha.boundary_elements.elastic import multiply_modes
 from icha.contact.attraction import BOND_COMPLIANCE, FINITE_RANGE, NO_ATTRACTION, SHORT_RANGE, straight_strength
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 # Width and radius of the stencil in cells, and weight of the perimeter in the work of adhesion, fitted to JKR patches.
 _WIDTH, STENCIL_RADIUS = 1.5, 5
@@ -313,6 +317,21 @@ def peak_by_direction(bonds: Bonds, gap: np.ndarray) -> np.ndarray:
     return np.where(ratio > 0, bonds.peak * np.sqrt(ratio), np.inf)
 
 
+def weights_between(cells: np.ndarray, grid: int) -> csr_array:
+    """Return the sparse matrix of the weights w between cells of a periodic grid, (k, k)."""
+    from scipy.sparse import csr_array
+
+    number = np.full(grid**2, -1)
+    number[cells] = np.arange(len(cells))
+    offset = np.arange(-STENCIL_RADIUS, STENCIL_RADIUS + 1)
+    (row, column), weight = np.divmod(cells[:, None], grid), np.outer(STENCIL, STENCIL).ravel()
+    rows, columns = (row + offset) % grid, (column + offset) % grid
+    neighbour = number[(rows[:, :, None] * grid + columns[:, None, :]).reshape(len(cells), offset.size**2)]
+    present = neighbour >= 0
+    starts = np.concatenate([[0], np.cumsum(np.count_nonzero(present, axis=1))])
+    return csr_array((np.broadcast_to(weight, present.shape)[present], neighbour[present], starts), (len(cells),) * 2)
+
+
 class AtDistance(Bonds):
     """Law of attraction that acts across every gap: contact forms and breaks by itself.
 
@@ -375,7 +394,7 @@ class AtDistance(Bonds):
         """Return 0: a law that does not depend on the direction dissipates nothing at fronts."""
         return 0.0
 
-    def tangent(self, bonds: Bonds, fraction: np.ndarray, gap: np.ndarray) -> Tangent:
+    def tangent(self, bonds: Bonds, fraction: np.ndarray, gap: np.ndarray, grid: int) -> Tangent:
         """Return the tangent of the law at given fractions and gaps, (k,)."""
         partial = np.flatnonzero((fraction > 0) & (fraction < 1))
         peak, softening = peak_by_direction(bonds, gap)[partial], bonds.softening(gap)[partial]
@@ -559,13 +578,19 @@ class ShortRange:
             closed[(row + offset[rows]) % grid, (column + offset[columns]) % grid] = True
         return closed
 
-    def tangent(self, bonds: Bonds, fraction: np.ndarray, gap: np.ndarray) -> Tangent:
+    def tangent(self, bonds: Bonds, fraction: np.ndarray, gap: np.ndarray, grid: int) -> Tangent:
         """Return the tangent of the law at given fractions and gaps, (k,)."""
         partial = (fraction > 0) & (fraction < 1)
         cells, ratio = np.asarray(bonds.cells)[partial], bonds.direction(gap)[partial]
         peak = peak_by_direction(bonds, gap)[partial]
 
+        length = np.broadcast_to(at_cells(self.adhesion_length, cells), cells.shape)
+        coupling = weights_between(cells, grid)
+        row = np.repeat(np.arange(len(cells)), np.diff(coupling.indptr))
+        change_of_work = PERIMETER * ratio[row] * (length[row] + length[coupling.indices])
+        coupling.data *= change_of_work / (BOND_COMPLIANCE * peak[row])
+
         def peak_change(change):
-            return ratio * self._work_by_fractions(change).ravel()[cells] / (BOND_COMPLIANCE * peak)
+            return coupling @ change.ravel()[cells]
 
         return Tangent(cells, fraction[partial], peak, bonds.softening(gap)[partial], peak_change)

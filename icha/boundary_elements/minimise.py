@@ -343,7 +343,7 @@ def rates(problem: Problem, found: Equilibrium, accuracy: float) -> tuple[np.nda
     The separation is the mean of the positions or, on a free square, the rigid approach.
     """
     space, bonds, gap = problem.space, problem.law.bonds(found.fraction), problem.crop(found.position) - problem.heights
-    tangent = problem.law.tangent(bonds, bonds.at(found.fraction), bonds.at(gap))
+    tangent = problem.law.tangent(bonds, bonds.at(found.fraction), bonds.at(gap), len(gap))
     control = Control(rigid=0.0) if space.free else Control(mean=0.0)
 
     def stiffness(change, control=control):
