@@ -114,11 +114,12 @@ class StepAccuracy:
     def locate_largest_tension(self, start, state, step):
         """Return the separation at which the tension is largest between two states, m, or None.
 
-        It is the minimum of the cubic polynomial with the pressures and slopes of both states. The tangents at both
-        states are no bound of the tension, because the pressure may jump without an event.
+        The separation is at the minimum of the cubic polynomial with the pressures and slopes of both states. The
+        tension is estimated by this minimum, or by the point where the tangents at both states meet if that is lower;
+        if the pressure jumps without an event, the tangents meet outside the step.
         Return None on loading, from or to full contact, with events that may change the pressure, or if the tension has
         no maximum between the states. Also return None if the tension was larger earlier on the path, or if the tension
-        in one of the two states equals the largest tension within the required accuracy.
+        in one of the two states equals the estimate within the required accuracy.
         """
         contact, du = self.contact, step.separation_change
         slope, end_slope = (-contact.stiffness(each) for each in (start, state))
@@ -130,7 +131,9 @@ class StepAccuracy:
         s, e = slope * du, end_slope * du
         a, b = 3 * (s + e - 2 * (q - p)), 3 * (q - p) - 2 * s - e
         t = -s / (b + np.sqrt(b * b - a * s))
-        lowest = p + t * (s + t * (b + t * a / 3))
+        # The tangents of both states meet at a larger tension, unless the pressure has jumped.
+        meet = (q - e - p) / (slope - end_slope)
+        lowest = p + min(slope * meet, t * (s + t * (b + t * a / 3)))
         if lowest >= self.lowest_pressure or min(p, q) - lowest <= contact.path_accuracy.tension * abs(lowest):
             return None
         return start.separation + t * du
