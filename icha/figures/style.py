@@ -140,7 +140,7 @@ def save(figure: Figure, png: str | os.PathLike, pdf: str | os.PathLike) -> None
 
 
 def logarithmic_axes(axes: Axes, directions: str = "xy") -> None:
-    """Make axes logarithmic; if an axis has fewer than two powers of ten, also label 2 and 5 times powers of ten."""
+    """Make axes logarithmic; if an axis has fewer than two powers of ten, also label ticks between powers of ten."""
     for direction in directions:
         axes.set(**{f"{direction}scale": "log"})
         axis = getattr(axes, f"{direction}axis")
@@ -148,12 +148,13 @@ def logarithmic_axes(axes: Axes, directions: str = "xy") -> None:
 
 
 def _minor_label(axis, value, _):
-    """Return the label of a tick between powers of ten; "" for most ticks."""
+    """Return the label of a tick between powers of ten: of 2 and 5, or on a short axis of all digits; else ""."""
     low, high = sorted(axis.get_view_interval())
     exponent = np.floor(np.log10(value))
     digit = value / 10.0**exponent
-    powers = np.floor(np.log10(high)) - np.ceil(np.log10(low)) + 1
-    shown = powers < 2 and np.isclose(digit, (2, 5)).any()
+    powers = 10.0 ** np.arange(np.floor(np.log10(low)), np.log10(high) + 1)
+    visible = [np.count_nonzero((low <= each * powers) & (each * powers <= high)) for each in (1, 2, 5)]
+    shown = visible[0] < 2 and (sum(visible) < 2 or np.isclose(digit, (2, 5)).any())
     return rf"${digit:g}\times10^{{{exponent:g}}}$" if shown else ""
 
 
