@@ -81,7 +81,7 @@ validation: tamaas
 	python -m validation.model_error
 	python -m validation.one_asperity
 
-# Some runs fail a check; docs/hysteresis.md states how many.
+# One run fails a check; docs/hysteresis.md states why.
 hysteresis: environment
 	-$(MAKE) run CONFIG=config/campaigns/hysteresis.yaml
 	python -m validation.hysteresis

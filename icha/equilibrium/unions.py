@@ -23,7 +23,7 @@ def merge_overlapping(state: IterationState, evaluation: Evaluation, margin=0.0,
     The unions have no heights before `set_union_heights` is called. If no spots merge, return `state` itself.
     margin : error of the approaches, m; two spots merge only if they would overlap in spite of such an error.
     deep : whether only those pairs merge in which one spot covers the centre of the other. Otherwise, two spots from
-        the split of one union merge again only on loading, and not before their area is that of the first coalescence.
+        the split of one union merge again only on loading, and not before their area is that of the split union.
     """
     sites, law, cell, a = state.sites, state.contact.law, state.contact.asperities.cell, evaluation.a
     pairs = _select_merging_pairs(state, evaluation, margin, deep)
