@@ -366,12 +366,9 @@ class BoundaryElements(FullContactProblem):
         cells = self.crop(self.attraction.acts_on(position - self.cell_heights, fraction))
         if window is None:
             return Window.around(cells)
-        outside = cells.copy()
-        outside[window.inside] = False
-        if not outside.any():
-            return window
-        outside[window.inside] = True
-        return Window.around(outside)
+        known = np.zeros_like(cells)
+        known[window.inside] = True
+        return Window.around(cells | known) if (cells & ~known).any() else window
 
     def _solve(self, state, separation, pressure=None):
         """Solve the equilibrium at a separation (m), or at a nominal pressure (Pa) with a guess of the separation."""

@@ -25,7 +25,6 @@ Lengths are in units of the cell size, pressures in E*.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -283,25 +282,24 @@ class Tangent:
     cells : (k,) int, flat indices of the cells with 0 < f < 1.
     fraction, softening : (k,), values of the cells.
     peak : (k,), tension at zero gap in the direction of each front; infinite where it stands.
-    peak_change : function that returns the changes of the peaks, (k,), from those of the fractions of all cells,
-        (n, n); None without an effect.
+    coupling : (k, k) sparse, change of the peaks with the fractions; None without an effect.
     """
 
     cells: np.ndarray
     fraction: np.ndarray
     peak: np.ndarray
     softening: np.ndarray
-    peak_change: Callable[[np.ndarray], np.ndarray] | None = None
+    coupling: csr_array | None = None
 
     def changes(self, gap_change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the changes of fractions and tensions, (n, n) each, for a change of the gaps, (n, n)."""
         tension = -self.softening * gap_change.ravel()[self.cells]
-        fraction = field_of(self.cells, tension / self.peak, gap_change.shape)
-        if self.peak_change is None:
-            return fraction, field_of(self.cells, tension, gap_change.shape)
-        for _ in range(_ROUNDS):
-            fraction.ravel()[self.cells] = (tension + (1 - self.fraction) * self.peak_change(fraction)) / self.peak
-        return fraction, field_of(self.cells, tension + self.peak_change(fraction), gap_change.shape)
+        fraction = tension / self.peak
+        if self.coupling is not None:
+            for _ in range(_ROUNDS):
+                fraction = (tension + (1 - self.fraction) * (self.coupling @ fraction)) / self.peak
+            tension = tension + self.coupling @ fraction
+        return field_of(self.cells, fraction, gap_change.shape), field_of(self.cells, tension, gap_change.shape)
 
 
 def directed(bonds: LinearBonds, ratio: float, before: np.ndarray | None) -> Bonds:
@@ -589,8 +587,4 @@ class ShortRange:
         row = np.repeat(np.arange(len(cells)), np.diff(coupling.indptr))
         change_of_work = PERIMETER * ratio[row] * (length[row] + length[coupling.indices])
         coupling.data *= change_of_work / (BOND_COMPLIANCE * peak[row])
-
-        def peak_change(change):
-            return coupling @ change.ravel()[cells]
-
-        return Tangent(cells, fraction[partial], peak, bonds.softening(gap)[partial], peak_change)
+        return Tangent(cells, fraction[partial], peak, bonds.softening(gap)[partial], coupling)
