@@ -406,11 +406,11 @@ class MeasuredSurface(_SurfaceFromFile):
     """A topography from a measurement."""
     path: File
     """Path of the topography file, relative to the configuration file."""
-    format: Literal["auto", "npy", "npz", "matlab", "netcdf", "matrix", "xyz", "hdf5", "fourier", "instrument"] = "auto"
+    format: Literal["auto", "npy", "npz", "matlab", "netcdf", "matrix", "xyz", "hdf5", "instrument"] = "auto"
     """Format of the file: `npy`; `npz`; `matlab`; `netcdf`; `hdf5`; `matrix` (text, a row of heights in each line);
-    `xyz` (text, x y z in each line, in any order); `fourier` (text, qx qy Re Im in each line); `instrument` (a
-    microscope's format that SurfaceTopography can read). With `auto`, ICHA chooses the format by the content of the
-    file, the ending of its name and, for text, the number of columns."""
+    `xyz` (text, x y z in each line, in any order); `instrument` (a microscope's format that SurfaceTopography can
+    read). With `auto`, ICHA chooses the format by the content of the file, the ending of its name and, for text, the
+    number of columns."""
     columns: Annotated[list[integer(IntegerRange(1))], Field(min_length=3, max_length=3)] | None = None
     """Numbers (from 1) of the columns x, y and z of a text file, such as `[1, 2, 3]`. This key is required if
     the file has more than three columns."""
@@ -425,8 +425,8 @@ class MeasuredSurface(_SurfaceFromFile):
     """Unit of the heights, such as `nm` or `0.1 mm`. Required for a file without this unit. The key replaces the
     unit in the file."""
     lateral_unit: UnitOfLength | None = None
-    """Unit of the coordinates x and y; with `format: fourier`, unit of 1/q. Default: the unit in the file. Required
-    if the file contains coordinates without a unit, and `size` is not given."""
+    """Unit of the coordinates x and y. Default: the unit in the file. Required if the file contains coordinates without
+    a unit, and `size` is not given."""
     size: Sides | None = None
     """Size of the whole scan: one length if the scan is square, or a list of two lengths, along x and y. The size of a
     pixel is the size of the scan divided by the number of pixels. Required if the file does not contain the size. This

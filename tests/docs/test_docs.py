@@ -97,12 +97,6 @@ def write_data(folder):
     np.savetxt(folder / "surface.0512x0512.ASCII.xyz.dat", np.column_stack([x.ravel(), y.ravel(), z.ravel()]))
     with h5py.File(folder / "surface.8192x8192.h5", "w") as file:
         file["surface"] = z
-    modes = np.fft.fft2(z, norm="forward")
-    numbers = np.fft.fftfreq(len(z), 1 / len(z)).astype(int)
-    qy, qx = np.meshgrid(numbers, numbers, indexing="ij")
-    few = (np.abs(qx) < 9) & (np.abs(qy) < 9)
-    columns = [qx[few], qy[few], modes.real[few], modes.imag[few]]
-    np.savetxt(folder / "surface.Fourier.ASCII.dat", np.column_stack(columns))
 
 
 @pytest.fixture(scope="module")
@@ -117,9 +111,6 @@ def folder(tmp_path_factory):
 
 
 def loaded(folder, campaign):
-    for surface in campaign["surfaces"].values():
-        if surface.get("format") == "fourier":
-            surface["grid"] = 64  # the file has few waves
     path = folder / f"config/campaigns/{campaign['name']}.yaml"
     path.write_text(yaml.safe_dump(campaign, sort_keys=False), encoding="utf-8")
     return load_configuration(path).campaign

@@ -144,60 +144,6 @@ def test_hdf5_packed_as_netcdf(tmp_path, fill, scale):
     np.testing.assert_allclose(heights[known], (stored[known] * factor + offset) * NM, rtol=1e-12)
 
 
-def waves():
-    """Some waves (kx, ky, amplitude) of a real series, one of every pair of opposite ones."""
-    rng = np.random.default_rng(5)
-    k = np.array([(1, 0), (0, 2), (3, 1), (-2, 3), (5, -4)])
-    return k, rng.normal(size=5) + 1j * rng.normal(size=5)
-
-
-def summed(n):
-    """The same waves added up one by one, node by node."""
-    y, x = np.mgrid[:n, :n] / n
-    k, h = waves()
-    each = (2 * (h_k * np.exp(2j * np.pi * (kx * x + ky * y))).real for (kx, ky), h_k in zip(k, h, strict=True))
-    return sum(each)
-
-
-@pytest.mark.parametrize("opposite", [False, True])
-@pytest.mark.parametrize("integers", [False, True])
-def test_fourier_list_of_the_challenge(tmp_path, opposite, integers):
-    """Wave vectors in rad per 0.1 mm (or as integers), heights in 0.1 mm, and the smaller numbers touch first."""
-    k, h = waves()
-    if opposite:
-        k, h = np.concatenate([k, -k]), np.concatenate([h, np.conj(h)])
-    q = k if integers else 2 * np.pi * k
-    np.savetxt(
-        tmp_path / "list.dat",
-        np.column_stack([q, h.real, h.imag]),
-        fmt=["%d"] * 2 + ["%.12e"] * 2 if integers else "%.12e",
-    )
-    keys = {"size": (1e-4, 1e-4)} if integers else {"lateral_unit": 1e-4}
-    settings = preparation(
-        format="fourier", boundary="periodic", height_unit=1e-4, grid=24, touches_first="low", **keys
-    )
-    surface = prepared_topography(tmp_path / "list.dat", settings).surface
-    np.testing.assert_allclose(surface.heights, -1e-4 * summed(24), atol=1e-14)
-    assert surface.period == pytest.approx(1e-4, rel=1e-10)
-
-
-def test_fourier_lists_that_are_none(tmp_path):
-    k, h = waves()
-    path = tmp_path / "list.dat"
-    np.savetxt(path, np.column_stack([k, h.real, h.imag]))
-    settings = preparation(format="fourier", boundary="periodic", height_unit=1e-4)
-    with refused("size"):
-        prepared_topography(path, settings)
-    settings["size"] = (1e-4, 1e-4)
-    assert prepared_topography(path, settings).surface.grid == 32  # the next power of two with four cells per wave
-    with refused("grid", "at least 12"):
-        prepared_topography(path, settings | {"grid": 10})
-    both = np.concatenate([k, -k]), np.concatenate([h, h])
-    np.savetxt(path, np.column_stack([both[0], both[1].real, both[1].imag]))
-    with pytest.raises(UnfitTopography, match="conjugate"):
-        prepared_topography(path, settings)
-
-
 def write_by_surface_topography(path):
     from SurfaceTopography import Topography
 
@@ -324,7 +270,7 @@ def test_an_empty_file_is_refused(tmp_path, name):
         scan(tmp_path / name, height_unit=NM, size=SIZE)
 
 
-@pytest.mark.parametrize("kind", ["matrix", "xyz", "fourier"])
+@pytest.mark.parametrize("kind", ["matrix", "xyz"])
 def test_a_heading_alone_is_refused(tmp_path, kind):
     (tmp_path / "scan.txt").write_text("# width 90 um\n\n  # heights\n")
     with refused("path", "has no numbers"):

@@ -22,7 +22,6 @@ from icha.surfaces.measured.topography import prepared_topography
 
 HUGE = 200_000  # nodes a side: 320 GB as floats
 LINES = {"height_unit": NM, "size": SIZE}
-WAVES = {"format": "fourier", "height_unit": NM, "size": (SIZE[0], SIZE[0])}
 
 
 def declare_npy(path):
@@ -45,10 +44,6 @@ def declare_hdf5(path):
         file.create_dataset("height", (HUGE, HUGE), "f8", chunks=(100, 100), compression="gzip")
 
 
-def declare_waves(path):
-    path.write_text("1 0 1 0\n16000 0 1 0\n")
-
-
 def declare_points(path):
     """Four points in the corners of a scan, and their neighbours."""
     ends = (0, 1, 30_000, 30_001)
@@ -60,16 +55,14 @@ DECLARED = {
     "scan.nc": declare_netcdf,
     "scan.h5": declare_hdf5,
     "scan.xyz": declare_points,
-    "waves.txt": declare_waves,
 }
 
 
 @pytest.mark.parametrize("name", DECLARED)
 def test_declared_sizes_are_bounded_before_anything_is_read(name, tmp_path):
     DECLARED[name](tmp_path / name)
-    keys = WAVES if name == "waves.txt" else LINES
     with refused("path", r"needs about .*B of memory; expected at most 2 GB"):
-        scan(tmp_path / name, **keys)
+        scan(tmp_path / name, **LINES)
     if name.endswith((".nc", ".npy")):
         with pytest.raises(ValueError, match=r"needs about .* at most 2 GB\. To allow more, .* ICHA_INPUT_MB"):
             read_height_map(tmp_path / name, 1.0)
@@ -244,12 +237,6 @@ def test_the_name_tells_where_the_content_cannot(tmp_path):
     assert scan(tmp_path / "N47E007.hgt", **LINES).format == "instrument (NASA SRTM)"
 
 
-def test_waves_that_no_grid_has(tmp_path):
-    (tmp_path / "waves.txt").write_text("1 0 1 0\n1e30 0 1 0\n")
-    with pytest.raises(UnfitTopography, match=r"expected no wave shorter than the period/16384"):
-        scan(tmp_path / "waves.txt", **WAVES)
-
-
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
     """Sound files of all formats, by their names, and a folder for others."""
@@ -257,7 +244,6 @@ def whole(tmp_path_factory):
     np.save(folder / "scan.npy", HEIGHTS)
     np.savetxt(folder / "scan.txt", HEIGHTS)
     write_xyz(folder / "scan.xyz")
-    (folder / "waves.txt").write_text("1 0 1 0\n0 2 1 1\n3 1 0.5 0\n")
     with h5py.File(folder / "scan.h5", "w") as file:
         file.create_dataset("height", data=HEIGHTS, chunks=(5, 8), compression="gzip")
         file["height"].attrs["units"] = "nm"
@@ -276,7 +262,7 @@ def whole(tmp_path_factory):
     return folder, {each.name: each.read_bytes() for each in folder.iterdir()}
 
 
-NAMES = ["scan.npy", "scan.txt", "scan.xyz", "waves.txt", "scan.h5", "scan.nc", "old.nc"]
+NAMES = ["scan.npy", "scan.txt", "scan.xyz", "scan.h5", "scan.nc", "old.nc"]
 NAMES += ["frt-2.frt", "top-1.top", "x3p-2_part.x3p"]
 
 
@@ -304,8 +290,7 @@ def test_damaged_and_changed_files_are_read_or_refused(whole, name, data):
             del content[at:]
     path = folder / f"changed_{name}"
     path.write_bytes(content)
-    keys = WAVES if name == "waves.txt" else LINES
-    settings = preparation(missing="fill", detrend="tilt") | keys
+    settings = preparation(missing="fill", detrend="tilt") | LINES
     try:
         surface = prepared_topography(path, settings).surface
     except UnfitTopography as error:

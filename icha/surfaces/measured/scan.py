@@ -21,7 +21,7 @@ from icha.surfaces.measured.array_files import (
     read_npz,
 )
 from icha.surfaces.measured.settings import LINE_SCAN, Preparation, UnfitTopography
-from icha.surfaces.measured.text_files import format_of_text, read_fourier, read_matrix, read_xyz
+from icha.surfaces.measured.text_files import format_of_text, read_matrix, read_xyz
 from icha.surfaces.measured.text_tables import SourceFile
 
 READERS = {
@@ -32,7 +32,6 @@ READERS = {
     "matrix": read_matrix,
     "xyz": read_xyz,
     "hdf5": read_hdf5,
-    "fourier": read_fourier,
     "instrument": read_instrument,
 }
 # Libraries of the readers. They are imported before the memory is limited, so their own memory does not count.

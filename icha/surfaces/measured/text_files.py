@@ -1,14 +1,12 @@
-"""Read text files with a row of heights, a point x y z, or a wave in every line; interpret the heading of the file."""
+"""Read text files with a row of heights or a point x y z in every line; interpret the heading of the file."""
 
 import math
 import re
 
 import numpy as np
-import scipy.fft
 
 from icha.support import formatting
 from icha.support.input_files import require_room
-from icha.support.rules import GRID
 from icha.support.tables import AMBIGUOUS_COMMA
 from icha.surfaces.measured.array_files import is_instrument_text
 from icha.surfaces.measured.settings import (
@@ -33,10 +31,6 @@ _QUANTITIES = re.compile(r"load|force|radius|area|pressure|displacement|indentat
 _FEW_DIGITS = 1e-6
 # A size in a heading of no known format counts only if the pixels are square up to this relative difference.
 _SQUARE = 1e-2
-# Bytes per node for the spectrum, the conjugate spectrum, their difference, the heights and the masks of waves.
-_BYTES_OF_NODE = 64
-# Opposite waves count as conjugate if the error, divided by the largest amplitude, is at most this value.
-_CONJUGATE = 1e-4
 # Words in the headings of texts that SurfaceTopography reads: Wyko, SPIP, Attocube, Nova, interferometers, line scans.
 _INSTRUMENT = re.compile(
     r"Wyko ASCII|File Format\s*=\s*ASCII|x-unit|^\s*Scale X\s*=|height\s+conversion\s+factor"
@@ -239,11 +233,8 @@ def _read_titles(titles):
 def _ask_for_columns(count, titles):
     """Raise UnfitTopography unless a table has three columns without titles."""
     if count != 3 or titles:
-        waves = ". For wave vectors and amplitudes use `format: fourier`" if count == 4 else ""
         lines = f"the columns are {', '.join(titles)[:80]}" if titles else f"lines have {count} numbers"
-        raise UnfitTopography(
-            "columns", f"is missing, and {lines}; expected the columns x, y and z, such as [1, 2, 3]{waves}"
-        )
+        raise UnfitTopography("columns", f"is missing, and {lines}; expected the columns x, y and z, such as [1, 2, 3]")
 
 
 class _Heading:
@@ -389,65 +380,3 @@ def _lengths(text):
 
 def _number(text):
     return float(text.replace(",", "."))
-
-
-def read_fourier(file: SourceFile, settings: Preparation) -> FileContent:
-    """Read a text file with a wave in every line, and sum the waves: h = sum h_q exp(i q.r).
-
-    If the wave -q is missing, its amplitude is the conjugate of the amplitude of q.
-    """
-    table = file.values
-    if table.shape[1] != 4 or not np.all(np.isfinite(table)):
-        raise _not_waves("expected four numbers in each line: qx qy Re Im")
-    k = _wave_numbers(table[:, :2], settings)
-    period = 2 * np.pi * np.max(np.abs(k)) / np.max(np.abs(table[:, :2]))
-    modes = table[:, 2] + 1j * table[:, 3]
-    if len(np.unique(k, axis=0)) < len(k):
-        raise _not_waves("a wave vector is given twice; expected every wave vector once")
-    highest = int(np.max(np.abs(k)))
-    n = settings.grid or 2 ** math.ceil(math.log2(max(4 * highest, 8)))
-    if 2 * highest >= n:
-        raise UnfitTopography(
-            "grid",
-            f"is too coarse for the shortest wave, period/{highest}; expected at least {2 * highest + 2}, better "
-            f"{4 * highest} or more",
-        )
-    require_room(_BYTES_OF_NODE * n**2)
-    spectrum, present = np.zeros((n, n), dtype=complex), np.zeros((n, n), dtype=bool)
-    spectrum[k[:, 1], k[:, 0]] = modes
-    present[k[:, 1], k[:, 0]] = True
-    opposite = np.ix_(-np.arange(n) % n, -np.arange(n) % n)
-    conjugate, opposite_present = np.conj(spectrum[opposite]), present[opposite]
-    differences = np.abs(spectrum - conjugate)[present & opposite_present]
-    if np.max(differences, initial=0.0) > _CONJUGATE * np.max(np.abs(modes)):
-        raise _not_waves("the heights would be complex; expected conjugate amplitudes of opposite wave vectors")
-    spectrum = np.where(opposite_present & ~present, conjugate, spectrum)
-    heights = scipy.fft.ifft2(spectrum, norm="forward", workers=1).real
-    return FileContent(heights, coordinates=(period, period), first_axis="y")
-
-
-def _not_waves(problem):
-    return UnfitTopography("path", f"cannot be read as fourier: {problem}")
-
-
-def _wave_numbers(q, settings):
-    """Return integer wave vectors, (n, 2) array, in units of 2 pi/period; integers in the file have this unit."""
-    largest = np.max(np.abs(q))
-    if settings.size is not None and len(set(settings.size)) > 1:
-        raise UnfitTopography("size", "has different sides, but a Fourier series needs a square; expected one length")
-    if np.all(q == np.rint(q)):
-        if settings.size is None:
-            raise UnfitTopography(
-                "size",
-                "is missing, but integer wave vectors are multiples of 2 pi/L; expected the period L, such as '0.1 mm'",
-            )
-        k = q
-    else:
-        unit = np.min(np.abs(q)[np.abs(q) > 1e-9 * largest])
-        # The smallest wave number has few digits in the file. Therefore the unit is computed from the largest one.
-        k = np.rint(q * (np.max(np.abs(np.rint(q / unit))) / largest))
-        if np.max(np.abs(q * (np.max(np.abs(k)) / largest) - k)) > 0.01:
-            raise _not_waves("expected wave vectors that are multiples of the smallest one")
-    if not 0 < np.max(np.abs(k)) <= GRID.most / 2:
-        raise _not_waves(f"expected no wave shorter than the period/{GRID.most // 2}")
-    return k.astype(int)
