@@ -9,7 +9,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from pathlib import Path as FilePath
 from typing import Annotated, Any, NamedTuple
 
 from pydantic import AfterValidator, Field, PrivateAttr
@@ -352,20 +351,6 @@ class Campaign(Section):
             if location[0] == "targets" and kind in AREAS and radii[location] < radius:
                 yield location, value, reason
                 return
-
-    def resolve_paths(self, folder: FilePath) -> Campaign:
-        """Return the campaign with `folder` added in front of all paths of files."""
-
-        def in_folder(section):
-            return section.model_copy(update={"path": str(folder / section.path)})
-
-        return self.model_copy(
-            update={
-                "surfaces": {n: in_folder(s) if s.from_file else s for n, s in self.surfaces.items()},
-                "measurements": {name: in_folder(m) for name, m in self.measurements.items()},
-                "figures": self.figures.in_folder(folder),
-            }
-        )
 
 
 def _within(location: tuple, problems: Iterable[Problem]) -> Iterator[Problem]:

@@ -24,7 +24,7 @@ from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
 from icha.datasets.labels import RunLabels, coarse_study, inputs_study, is_derived_study, number_label
 from icha.path.targets import ESTIMATED_AT_TARGETS, ESTIMATED_OF_LOOPS
 from icha.support.units import PREFIXES
-from icha.support.values import LONGEST_LABEL, NOTHING, Problem, list_names, rule_of
+from icha.support.values import LONGEST_LABEL, NOTHING, Folders, Problem, list_names, rule_of
 
 MAX_RUNS = 100_000
 # Largest number of targets of all runs together.
@@ -43,13 +43,14 @@ _CASE = "case"
 _Located = tuple[tuple, Any]
 
 
-def expand_design(campaign: Campaign, content: Mapping) -> tuple[Campaign, list[Problem]]:
+def expand_design(campaign: Campaign, content: Mapping, folders: Folders) -> tuple[Campaign, list[Problem]]:
     """Return the campaign with all runs of every study.
 
     Parameters
     ----------
     campaign : the campaign as written in the configuration file.
     content : the configuration as nested mappings; variants of surfaces and materials are made from this content.
+    folders : context of the validation.
 
     Returns
     -------
@@ -62,7 +63,7 @@ def expand_design(campaign: Campaign, content: Mapping) -> tuple[Campaign, list[
     problems = list(itertools.islice(problems, MOST_PROBLEMS + 1)) or list(_too_many_runs(campaign))
     if problems:
         return campaign, problems
-    variants = _Variants(campaign, content)
+    variants = _Variants(campaign, content, folders)
     runs, studies = {}, {}
     for label, study in campaign.studies.items():
         levels = study.seeds_of_levels
@@ -271,8 +272,8 @@ def _key_of_levels(study):
 class _Variants:
     """Variants: surfaces and materials with varied parameters, one for each combination of values."""
 
-    def __init__(self, campaign: Campaign, content: Mapping):
-        self._campaign, self._content = campaign, content
+    def __init__(self, campaign: Campaign, content: Mapping, folders: Folders):
+        self._campaign, self._content, self._folders = campaign, content, folders
         self._names: dict[tuple, str] = {}
         self.derived: dict[str, dict[str, Any]] = {"surfaces": {}, "materials": {}}
         self.origin: dict[tuple[str, str], str] = {}
@@ -326,7 +327,8 @@ class _Variants:
         entries = getattr(self._campaign, section)
         values = {name: value for name, (_, value) in changes.items()}
         try:
-            variant = type(entries[base]).model_validate(dict(self._content[section][base]) | values)
+            changed = dict(self._content[section][base]) | values
+            variant = type(entries[base]).model_validate(changed, context=self._folders)
         except ValidationError as error:
             for keys, wrong, reason in map(problem_of, error.errors()):
                 key = str(keys[0]) if keys else ""
@@ -340,8 +342,6 @@ class _Variants:
             reason += "`youngs_modulus` instead of `contact_modulus`, or a layer with `thickness`. Or remove the key"
             location, value = changes["poisson_ratio"]
             self.problems.setdefault(location, (location, value, reason))
-        if hasattr(variant, "path"):
-            variant = variant.model_copy(update={"path": entries[base].path})
         name = "-".join([base, *([case] if case else (f"{key}{value_label(variant, key)}" for key in changes))])
         if name in entries or len(name) > LONGEST_LABEL:
             reason = f"makes a variant of {base!r} with the name {name!r}; expected a name that no other entry has, and"

@@ -8,8 +8,7 @@ key are in the schema.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from pydantic import ConfigDict, Field
 
@@ -484,11 +483,6 @@ class Figures(Section):
         """Return the request of each figure to draw, by the name of the figure."""
         drawn = {name: getattr(self, name) for name in type(self).model_fields}
         return {name: request for name, request in drawn.items() if request is not None} | self.model_extra
-
-    def in_folder(self, folder: Path) -> Self:
-        """Return the figures with `folder` in front of the paths of the scripts."""
-        own = {n: each.model_copy(update={"script": str(folder / each.script)}) for n, each in self.model_extra.items()}
-        return self.model_copy(update=own)
 
     def script_problems(self) -> Iterator[Problem]:
         """Yield a problem for each script that cannot draw a figure."""

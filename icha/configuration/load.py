@@ -3,9 +3,8 @@
 import itertools
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -43,7 +42,7 @@ from icha.configuration.yaml_files import (
 )
 from icha.datasets.results import CHOSEN_LEVELS
 from icha.support.scripts import modules_of
-from icha.support.values import NAME_PATTERN, NOTHING, Problem
+from icha.support.values import NAME_PATTERN, NOTHING, Folders
 
 
 @dataclass(frozen=True)
@@ -99,7 +98,6 @@ def _load(source: Source, within: str | os.PathLike | None) -> Configuration:
     unusual = unusual_values(source.content)
     campaign = _check_text(source, unusual, within)
     text, confirmed = dump_yaml(source.content, source.name), source.content.get(CONFIRMED)
-    refuse(source, _files_outside(campaign, within) if within is not None else ())
     topographies, unread = inspect_topographies(campaign)
     refuse(source, itertools.chain(unread, campaign.file_problems()))
     campaign = campaign.with_topographies(topographies)
@@ -168,44 +166,22 @@ def _check_text(source: Source, unusual: list[Unusual], within: str | os.PathLik
     content = apply_defaults(source.content)
     if excess := excessive_size(content):
         raise ConfigurationError(f"{source.name}: {excess}; expected fewer")
-    content["materials"] = _with_paths_of_maps(source, content.get("materials"), within)
+    folders = Folders(Path(source.name).parent, None if within is None else Path(within))
     try:
-        campaign = Campaign.model_validate(content)
+        campaign = Campaign.model_validate(content, context=folders)
     except ValidationError as error:
         refuse(source, map(problem_of, error.errors()), implausible)
-    campaign, problems = expand_design(campaign.resolve_paths(Path(source.name).parent), content)
+    campaign, problems = expand_design(campaign, content, folders)
     refuse(source, problems, implausible)
     refuse(source, itertools.chain(implausible, campaign.problems()))
     return campaign
 
 
-def _with_paths_of_maps(source: Source, materials: Any, within: str | os.PathLike | None) -> Any:
-    """Return the content of the section `materials` with complete paths of the maps of works of adhesion."""
-    folder, outside = Path(source.name).parent, []
-
-    def resolve(file, name):
-        try:
-            if within is not None and not _is_inside(folder / file, within):
-                outside.append((("materials", name), file, _OUTSIDE))
-        except ValueError:  # characters that no path contains; the check of the text reports them
-            return file
-        return str(folder / file)
-
-    if not isinstance(materials, Mapping):
-        return materials
-    resolved = {name: _with_file(each, partial(resolve, name=name)) for name, each in materials.items()}
-    refuse(source, outside)
-    return resolved
-
-
-def _with_file(material: Any, change: Callable[[str], str]) -> Any:
+def _with_map(material: Any, path: str) -> Any:
     """Return the content of a material, with another path of its map of works of adhesion."""
     if not isinstance(material, Mapping):
         return material
-    return {
-        key: change(value) if key == "file" and isinstance(value, str) else _with_file(value, change)
-        for key, value in material.items()
-    }
+    return {key: path if key == "file" else _with_map(value, path) for key, value in material.items()}
 
 
 def _named_files(campaign: Campaign) -> dict[tuple[str, str], str]:
@@ -215,35 +191,6 @@ def _named_files(campaign: Campaign) -> dict[tuple[str, str], str]:
     maps = {("materials", name): each.adhesion_map for name, each in campaign.materials.items()}
     files |= {key: each.file for key, each in maps.items() if each and each.file}
     return files | {("measurements", name): each.path for name, each in campaign.measurements.items()}
-
-
-def _key_of_path(section: str) -> str:
-    return "script" if section == "figures" else "path"
-
-
-def _files_of(section: str, path: str) -> dict[str, str]:
-    """Return a file that a configuration names, and the modules of a script, by path below the folder of the file."""
-    modules = modules_of(path) if section == "figures" else ()
-    folder = Path(path).resolve().parent
-    return {Path(path).name: path} | {file.relative_to(folder).as_posix(): str(file) for file in modules}
-
-
-# Message for a file outside the folder of the configuration.
-_OUTSIDE = "is outside the folder of the configuration; expected files in this folder"
-
-
-def _is_inside(path: str | os.PathLike, folder: str | os.PathLike) -> bool:
-    """Return whether a file is inside a folder; links are resolved first."""
-    return Path(path).resolve().is_relative_to(Path(folder).resolve())
-
-
-def _files_outside(campaign: Campaign, folder: str | os.PathLike) -> list[Problem]:
-    """Return a problem for each of a campaign's files that lies outside a folder."""
-    return [
-        ((section, campaign.origin(section, name), _key_of_path(section)), path, _OUTSIDE)
-        for (section, name), path in _named_files(campaign).items()
-        if not _is_inside(path, folder)
-    ]
 
 
 # Folder for copies of the files that a configuration names; a copy of the configuration is in the parent folder.
@@ -272,13 +219,14 @@ def collect_inputs(configuration: Configuration) -> tuple[str, dict[str, str]]:
     used = {("surfaces", campaign.origin("surfaces", name)) for name in surfaces}
     files = {}
     for (section, name), path in named.items():
-        folder = PurePosixPath(INPUTS, section, name)
-        stored = {str(folder / place): file for place, file in _files_of(section, path).items()}
-        entry, first = content[section][name] or {}, next(iter(stored))
-        by_map, by_key = lambda _, first=first: first, {_key_of_path(section): first}
-        content[section][name] = _with_file(entry, by_map) if section == "materials" else entry | by_key
+        folder, home = PurePosixPath(INPUTS, section, name), Path(path).resolve().parent
+        modules = modules_of(path) if section == "figures" else ()
+        stored = {Path(path).name: path} | {file.relative_to(home).as_posix(): str(file) for file in modules}
+        entry, first = content[section][name] or {}, str(folder / Path(path).name)
+        key = "script" if section == "figures" else "path"
+        content[section][name] = _with_map(entry, first) if section == "materials" else entry | {key: first}
         if section != "surfaces" or (section, name) in used:
-            files |= stored
+            files |= {str(folder / place): file for place, file in stored.items()}
     # Every surface from a file now has its own path, so the path is removed from the defaults.
     (content.get("defaults") or {}).get("surfaces", {}).pop("path", None)
     return dump_yaml(content, configuration.origin), files

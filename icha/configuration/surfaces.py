@@ -11,6 +11,7 @@ from pydantic import (
     Field,
     TypeAdapter,
     ValidationError,
+    ValidationInfo,
     WithJsonSchema,
     computed_field,
     field_validator,
@@ -255,7 +256,7 @@ class MaterialSection(Section):
 
     @model_validator(mode="before")
     @classmethod
-    def _divide_energy(cls, content: Any) -> Any:
+    def _divide_energy(cls, content: Any, info: ValidationInfo) -> Any:
         """Divide a work of adhesion by direction and place into three keys."""
         energy = content.get("surface_energy") if isinstance(content, Mapping) else None
         if isinstance(energy, Mapping) and set(energy) == {"advancing", "receding"}:
@@ -273,7 +274,7 @@ class MaterialSection(Section):
         if content.get("adhesion_map") is not None:
             raise ValueError("adhesion_map: is given beside a map in surface_energy; expected one of both")
         try:
-            mean = AdhesionMapSection.model_validate(energy).field.mean
+            mean = AdhesionMapSection.model_validate(energy, context=info.context).field.mean
         except ValidationError:
             mean = 1.0  # the map reports the problem
         return {**content, "surface_energy": f"{mean!r} J/m^2", "adhesion_map": energy}

@@ -7,9 +7,10 @@ import unicodedata
 from collections.abc import Callable, Iterable, Iterator
 from decimal import Decimal
 from itertools import pairwise
-from typing import Annotated, Any, get_args
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple, get_args
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, WithJsonSchema
 
 from icha.support.rules import (
     CONTACT_MODULUS,
@@ -216,11 +217,32 @@ def _without_controls(value: str) -> str:
 Text = Annotated[str, Field(strict=True, min_length=1), AfterValidator(_without_controls)]
 
 
-def _file(value: str) -> str:
-    """Return a path; raise ValueError for braces, which Snakemake would read as patterns."""
+class Folders(NamedTuple):
+    """Context in which a configuration is validated.
+
+    Attributes
+    ----------
+    of_paths : folder to which the paths in the configuration are relative.
+    within : folder that must contain all files; None to allow any folder.
+    """
+
+    of_paths: Path
+    within: Path | None = None
+
+
+def _file(value: str, info: ValidationInfo) -> str:
+    """Return the complete path of a file; raise ValueError if the path has braces or leads out of the allowed folder.
+
+    Without the context `Folders`, the path remains as it is. Snakemake would read braces as patterns.
+    """
     if re.search(r"[{}]", value):
         raise ValueError("contains braces; expected the path of a file without { and }")
-    return value
+    if (folders := info.context) is None:
+        return value
+    path = folders.of_paths / value
+    if folders.within is not None and not path.resolve().is_relative_to(folders.within.resolve()):
+        raise ValueError("is outside the folder of the configuration; expected files in this folder")
+    return str(path)
 
 
 File = Annotated[Text, AfterValidator(_file)]
