@@ -7,7 +7,8 @@ key are in the schema.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import itertools
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from pydantic import ConfigDict, Field
@@ -23,11 +24,31 @@ from icha.support.values import File, Label, Name, Positive, Problem, Section, S
 if TYPE_CHECKING:
     from icha.configuration.campaign import Campaign
     from icha.configuration.measurements import Measurement
+    from icha.configuration.studies import Study
 
-_NOT_UNLOADED = "is not unloaded; expected a study with `unload: true`"
-_NO_BOUNDARY_ELEMENTS = (
-    f"has no runs with boundary elements; expected a study with {REFERENCE_MODEL!r} among its `models`"
-)
+# Keys that name one study or several.
+_STUDY_KEYS = ("study", "boundary_elements", "load_studies", "studies")
+_UNLOADED = "is not unloaded; expected a study with `unload: true`"
+_COMPARED = "expected a study with both `models` and targets `reduced_pressures`"
+_KIND = "has no snapshot of kind {kind}; expected a study with such a snapshot".format
+# Conditions on a study, each with the problem of a study that does not meet it; `{models}` stands for its models.
+_CONDITIONS: dict[str, tuple[Callable[[Study], Any], str]] = {
+    "unloads completely": (lambda study: study.unload, _UNLOADED),
+    "unloads": (lambda study: study.unload or study.turning_points, _UNLOADED),
+    "boundary elements": (
+        lambda study: REFERENCE_MODEL in study.models,
+        f"has no runs with boundary elements; expected a study with {REFERENCE_MODEL!r} among its `models`",
+    ),
+    "both models": (lambda study: len(study.models) == len(MODELS), f"has only runs with {{models}}; {_COMPARED}"),
+    "reduced pressures": (
+        lambda study: study.targets.reduced_pressures,
+        f"has no targets `reduced_pressures`, at which both models have the same load; {_COMPARED}",
+    ),
+    "snapshots": (lambda s: s.saved_states != [], "has no snapshot to draw; expected a study with `snapshots`"),
+    "relative load": (lambda s: "relative_load" in dict(s.saved_states or ()), _KIND(kind="relative_load")),
+    "area fraction": (lambda s: "area_fraction" in dict(s.saved_states or ()), _KIND(kind="area_fraction")),
+    "sample": (lambda study: study.sample, "has no sampled cases; expected a study with `sample`"),
+}
 
 
 class FigureRequest(Section):
@@ -35,16 +56,33 @@ class FigureRequest(Section):
 
     # True if drawing needs memory for all heights of the surface.
     holds_topography: ClassVar[bool] = False
+    # Conditions on the studies in a key, in addition to those of the base classes.
+    needs: ClassVar[dict[str, tuple[str, ...]]] = {}
+
+    def studies_by_key(self) -> Iterator[tuple[tuple, str]]:
+        """Yield the location (keys) and the name of each study whose runs the figure shows."""
+        for key in _STUDY_KEYS:
+            value = getattr(self, key, None) or ()
+            yield from [((key,), value)] if isinstance(value, str) else (((key, k), x) for k, x in enumerate(value))
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
         """Yield a problem for each option that does not fit the campaign, such as the name of an unknown study."""
+        for location, name in self.studies_by_key():
+            yield from unknown(location, name, campaign.studies)
+            if (study := campaign.studies.get(name)) is None:
+                continue
+            if location == ("study",):
+                yield from self._option_problems(campaign, study)
+            needs = [vars(base).get("needs", {}).get(location[0], ()) for base in type(self).__mro__]
+            for is_met, problem in (_CONDITIONS[each] for each in itertools.chain(*needs)):
+                if not is_met(study):
+                    yield location, name, problem.format(models=list_names(study.models))
+
+    def _option_problems(self, campaign: Campaign, study: Study) -> Iterator[Problem]:
+        """Yield a problem for each option that does not fit the study `study`."""
         yield from ()
 
-    def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
-        """Return the studies whose runs the figure shows."""
-        return ()
-
-    def inputs(self, campaign: Campaign, files: results.ResultFiles) -> dict[str, str | list[str]]:
+    def _inputs(self, campaign: Campaign, files: results.ResultFiles) -> dict[str, str | list[str]]:
         """Return the path or the paths of input files, by argument of the function that draws."""
         return {"campaign": files.path(results.DATASET)}
 
@@ -58,8 +96,7 @@ class JKRFigure(FigureRequest):
 
     tabor_parameter: Positive = Field(default=3.0, description="Tabor parameter, which sets the jump-in distance.")
 
-    def inputs(self, campaign, files):
-        """Return no files."""
+    def _inputs(self, campaign, files):
         return {}
 
 
@@ -68,18 +105,7 @@ class StudyFigure(FigureRequest):
 
     study: Name = Field(description="Name of the study that is drawn.")
 
-    def studies_of(self, campaign):
-        """Return the name of the only study that the figure shows."""
-        return (self.study,)
-
-    def problems(self, campaign):
-        """Yield a problem if the study does not exist; otherwise yield the problems from `study_problems`."""
-        yield from unknown(("study",), self.study, campaign.studies)
-        if self.study in campaign.studies:
-            yield from self.study_problems(campaign, campaign.studies[self.study])
-
-    def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
-        """Yield a problem for each requested surface, seed, material or slope that the study does not have."""
+    def _option_problems(self, campaign, study):
         for key, present in (
             ("surface", study.surfaces),
             ("seed", study.seeds),
@@ -94,11 +120,10 @@ class StudyFigure(FigureRequest):
 class TheoryFigure(StudyFigure):
     """A figure of all runs of a study, with theories."""
 
-    def inputs(self, campaign, files):
-        """Also return the path of the theories for the study's first surface, if it is flat."""
+    def _inputs(self, campaign, files):
         surface = campaign.studies[self.study].surfaces[0]
         theories = {"references": files.path(results.THEORIES, surface=surface)} if campaign.is_flat(surface) else {}
-        return super().inputs(campaign, files) | theories
+        return super()._inputs(campaign, files) | theories
 
 
 class TruthFigure(StudyFigure):
@@ -110,18 +135,7 @@ class TruthFigure(StudyFigure):
         "it has such runs.",
     )
 
-    def studies_of(self, campaign):
-        """Return the name of the study and, if different, the name of the study with boundary elements."""
-        return tuple(dict.fromkeys(filter(None, (self.study, self.boundary_elements))))
-
-    def problems(self, campaign):
-        """Also yield a problem if the study in `boundary_elements` does not exist or has no boundary elements."""
-        yield from super().problems(campaign)
-        location, name = ("boundary_elements",), self.boundary_elements
-        if name is not None:
-            yield from unknown(location, name, campaign.studies)
-            if name in campaign.studies and REFERENCE_MODEL not in campaign.studies[name].models:
-                yield location, name, _NO_BOUNDARY_ELEMENTS
+    needs = {"boundary_elements": ("boundary elements",)}
 
 
 class SnapshotFigure(StudyFigure):
@@ -129,14 +143,13 @@ class SnapshotFigure(StudyFigure):
 
     snapshot: Snapshot | None = Field(default=None, description="Snapshot of the study. Default: the first one.")
 
-    def study_problems(self, campaign, study):
-        """Also yield a problem if the study does not have the snapshot."""
-        yield from super().study_problems(campaign, study)
-        snapshots = study.saved_states
-        if snapshots == []:
-            yield ("study",), self.study, "has no snapshot to draw; expected a study with `snapshots`"
-        elif self.snapshot is not None and self.snapshot.kind_and_value not in (snapshots or []):
-            kept = list_names(f"{kind} {value:g}" for kind, value in snapshots or []) or "none"
+    needs = {"study": ("snapshots",)}
+
+    def _option_problems(self, campaign, study):
+        yield from super()._option_problems(campaign, study)
+        snapshots = study.saved_states or []
+        if study.saved_states != [] and self.snapshot and self.snapshot.kind_and_value not in snapshots:
+            kept = list_names(f"{kind} {value:g}" for kind, value in snapshots) or "none"
             kind, value = self.snapshot.kind_and_value
             problem = f"is not a snapshot of study {self.study!r}; expected one of: {kept}"
             yield ("snapshot",), f"{kind} {value:g}", problem
@@ -169,11 +182,7 @@ class TopographyFigure(StudyFigure):
 class UnloadedFigure(StudyFigure):
     """A figure of the runs of a study in loading and unloading."""
 
-    def study_problems(self, campaign, study):
-        """Also yield a problem if the study does not unload."""
-        yield from super().study_problems(campaign, study)
-        if not (study.unload or study.turning_points):
-            yield ("study",), self.study, _NOT_UNLOADED
+    needs = {"study": ("unloads",)}
 
 
 class RunFigure(TopographyFigure):
@@ -183,11 +192,10 @@ class RunFigure(TopographyFigure):
     material: Label | None = Field(
         default=None, description="Material to show. Default: the first material with adhesion, if any."
     )
-    holds_topography: ClassVar[bool] = True
+    holds_topography = True
 
-    def inputs(self, campaign, files):
-        """Also return the path of the surface file of the run."""
-        return super().inputs(campaign, files) | {"surface": files.path(results.SURFACE, self.run(campaign))}
+    def _inputs(self, campaign, files):
+        return super()._inputs(campaign, files) | {"surface": files.path(results.SURFACE, self.run(campaign))}
 
     def arguments(self, campaign):
         """Return the arguments with the labels of the run."""
@@ -210,9 +218,8 @@ class AreaAndGapFigure(UnitsFigure, TheoryFigure):
 class MapFigure(SnapshotFigure, RunFigure):
     """A figure of one snapshot. ICHA draws the first run that fits the options, if possible a run with adhesion."""
 
-    def inputs(self, campaign, files):
-        """Also return the path of the same run with boundary elements, if any."""
-        found, run = super().inputs(campaign, files), self.run(campaign)
+    def _inputs(self, campaign, files):
+        found, run = super()._inputs(campaign, files), self.run(campaign)
         if run.model == DEFAULT_MODEL and REFERENCE_MODEL in campaign.studies[self.study].models:
             found["truth"] = files.path(results.RUN, run._replace(model=REFERENCE_MODEL))
         return found
@@ -224,17 +231,16 @@ class MeasuredFigure(StudyFigure):
     # True if the figure shows measured values of indenters.
     of_indenters: ClassVar[bool] = False
 
-    def inputs(self, campaign, files):
-        """Also return the paths of the tables of measurements for the study, if any."""
+    def _inputs(self, campaign, files):
         tables = [measurement.path for measurement in self.measurements(campaign)]
-        return super().inputs(campaign, files) | ({"tables": tables} if tables else {})
+        return super()._inputs(campaign, files) | ({"tables": tables} if tables else {})
 
     def arguments(self, campaign):
         """Return the arguments with the `measurements`."""
-        known = [self.known(campaign, each) for each in self.measurements(campaign)]
+        known = [self._known(campaign, each) for each in self.measurements(campaign)]
         return super().arguments(campaign) | ({"measurements": known} if known else {})
 
-    def known(self, campaign: Campaign, measurement: Measurement) -> dict[str, Any]:
+    def _known(self, campaign: Campaign, measurement: Measurement) -> dict[str, Any]:
         """Return what the function that draws needs about a measurement."""
         return {name: getattr(measurement, name) for name in ("label", "citation", "columns", "material")}
 
@@ -247,13 +253,11 @@ class MeasuredFigure(StudyFigure):
 class SlopesAndMaterialsFigure(MeasuredFigure, TruthFigure):
     """A figure of all runs of a study, with boundary elements and measurements."""
 
-    def known(self, campaign, measurement):
-        """Also return the rms slope and, for loads in units of pressure, the contact modulus."""
+    def _known(self, campaign, measurement):
+        # Also the rms slope and, for loads in units of pressure, the contact modulus.
         modulus = campaign.materials[measurement.material].contact_modulus if measurement.load_is_pressure else None
-        return super().known(campaign, measurement) | {
-            "rms_slope": measurement.rms_slope,
-            "contact_modulus": modulus,
-        }
+        found = {"rms_slope": measurement.rms_slope, "contact_modulus": modulus}
+        return super()._known(campaign, measurement) | found
 
 
 class SlopesFigure(TopographyFigure):
@@ -261,43 +265,20 @@ class SlopesFigure(TopographyFigure):
 
     material: Label | None = Field(default=None, description="Material to show. Default: the study's first material.")
 
-    def study_problems(self, campaign, study):
-        """Also yield a problem if the study does not have snapshots of both kinds."""
-        yield from super().study_problems(campaign, study)
-        kinds = [kind for kind, _ in study.saved_states or []]
-        for kind in ("relative_load", "area_fraction"):
-            if kind not in kinds:
-                yield ("study",), self.study, f"has no snapshot of kind {kind}; expected a study with such a snapshot"
+    needs = {"study": ("relative load", "area fraction")}
 
 
 class ComparedFigure(StudyFigure):
     """A comparison with boundary elements. The study needs both models."""
 
-    def inputs(self, campaign, files):
-        """Also return the path of the model error. The campaign dataset determines the colours."""
-        return super().inputs(campaign, files) | {"model_error": files.path(results.MODEL_ERROR)}
+    needs = {"study": ("both models", "reduced pressures")}
 
-    def study_problems(self, campaign, study):
-        """Also yield a problem if the study has not both models, or no targets at which both have the same load."""
-        yield from super().study_problems(campaign, study)
-        expected = "expected a study with both `models` and targets `reduced_pressures`"
-        if len(study.models) < len(MODELS):
-            yield ("study",), self.study, f"has only runs with {list_names(study.models)}; {expected}"
-        elif not campaign.compares_models(self.study):
-            problem = "has no targets `reduced_pressures`, at which both models have the same load"
-            yield ("study",), self.study, f"{problem}; {expected}"
+    def _inputs(self, campaign, files):
+        return super()._inputs(campaign, files) | {"model_error": files.path(results.MODEL_ERROR)}
 
 
 class LoopsFigure(UnitsFigure, TruthFigure, TopographyFigure, UnloadedFigure):
     """A figure of the runs of a study in loading and unloading, on one topography."""
-
-
-def _problems_of_unloading(campaign: Campaign, studies: Mapping[tuple, str]) -> Iterator[Problem]:
-    """Yield a problem for each study that does not exist or does not unload; `studies` maps keys to names."""
-    for location, name in studies.items():
-        yield from unknown(location, name, campaign.studies)
-        if name in campaign.studies and not campaign.studies[name].unload:
-            yield location, name, _NOT_UNLOADED
 
 
 class PullOffFigure(StudyFigure):
@@ -307,14 +288,7 @@ class PullOffFigure(StudyFigure):
         default=None, description="Names of studies that differ in their largest load, for a second panel."
     )
 
-    def studies_of(self, campaign):
-        """Return the studies of both panels."""
-        return tuple(dict.fromkeys([self.study, *(self.load_studies or ())]))
-
-    def problems(self, campaign):
-        """Yield a problem for each study that does not exist or does not unload completely."""
-        loads = {("load_studies", k): name for k, name in enumerate(self.load_studies or ())}
-        yield from _problems_of_unloading(campaign, loads | {("study",): self.study})
+    needs = dict.fromkeys(("study", "load_studies"), ("unloads completely",))
 
 
 class LossFigure(FigureRequest):
@@ -323,13 +297,7 @@ class LossFigure(FigureRequest):
     studies: list_of_names()
     """Names of the studies that are drawn. Lines are fitted to runs that differ only in their largest load."""
 
-    def studies_of(self, campaign):
-        """Return the names of all studies of the figure."""
-        return tuple(dict.fromkeys(self.studies))
-
-    def problems(self, campaign):
-        """Yield a problem for each study that does not exist or does not unload."""
-        yield from _problems_of_unloading(campaign, {("studies", k): name for k, name in enumerate(self.studies)})
+    needs = {"studies": ("unloads completely",)}
 
 
 class SnapMapFigure(RunFigure, UnloadedFigure):
@@ -339,20 +307,19 @@ class SnapMapFigure(RunFigure, UnloadedFigure):
 class IndenterFigure(MeasuredFigure, UnloadedFigure):
     """A figure of the runs of a study with indenters, in loading and unloading, with measurements."""
 
-    of_indenters: ClassVar[bool] = True
+    of_indenters = True
 
-    def known(self, campaign, measurement):
-        """Also return the names of the quantities, in the order of the columns, and the works of adhesion."""
-        found = super().known(campaign, measurement) | {"quantities": list(measurement.si_units)}
+    def _known(self, campaign, measurement):
+        # Also the names of the quantities, in the order of the columns, and the works of adhesion.
+        found = super()._known(campaign, measurement) | {"quantities": list(measurement.si_units)}
         material = campaign.materials.get(measurement.material)
         if material is None:
             return found
         works = material.surface_energy, material.receding_energy or material.surface_energy
         return found | {"works": works}
 
-    def study_problems(self, campaign, study):
-        """Also yield a problem if a surface of the study is periodic."""
-        yield from super().study_problems(campaign, study)
+    def _option_problems(self, campaign, study):
+        yield from super()._option_problems(campaign, study)
         if periodic := [name for name in study.surfaces if not campaign.is_free(name)]:
             expected = "expected surfaces with `shape` or `boundary: free`"
             yield ("study",), self.study, f"has the periodic surface {periodic[0]!r}; {expected}"
@@ -361,18 +328,11 @@ class IndenterFigure(MeasuredFigure, UnloadedFigure):
 class PressureMapsFigure(RunFigure):
     """A figure of one run with boundary elements, with a map for each of its snapshots."""
 
-    def inputs(self, campaign, files):
-        """Return the paths of the campaign dataset and of the file of the run, which contains the maps."""
+    needs = {"study": ("boundary elements", "snapshots")}
+
+    def _inputs(self, campaign, files):
         run = files.path(results.RUN, self.run(campaign))
         return {"campaign": files.path(results.DATASET), "maps": run}
-
-    def study_problems(self, campaign, study):
-        """Also yield a problem if the study has no boundary elements, or no snapshot."""
-        yield from super().study_problems(campaign, study)
-        if REFERENCE_MODEL not in study.models:
-            yield ("study",), self.study, _NO_BOUNDARY_ELEMENTS
-        if study.saved_states == []:
-            yield ("study",), self.study, "has no snapshot to draw; expected a study with `snapshots`"
 
     def run(self, campaign):
         """Return the first run with boundary elements that fits the options; a run with adhesion is preferred."""
@@ -384,14 +344,12 @@ class SampleFigure(StudyFigure):
 
     target: int = Field(default=-1, ge=-1, description="Number of the target, from 0. Default (-1): the last target.")
 
-    def inputs(self, campaign, files):
-        """Return the path of the file of sampled cases."""
+    def _inputs(self, campaign, files):
         return {"sensitivity": files.path(results.SENSITIVITY)}
 
-    def study_problems(self, campaign, study):
-        """Yield a problem if the study has no `sample`, or not this target."""
-        if study.sample is None:
-            yield ("study",), self.study, "has no sampled cases; expected a study with `sample`"
+    needs = {"study": ("sample",)}
+
+    def _option_problems(self, campaign, study):
         last = len(study.targets.states) - 1
         if self.target > last:
             yield ("target",), self.target, f"is not the number of a target; expected -1, 0, … {last}"
@@ -404,9 +362,8 @@ class ParametersFigure(SampleFigure):
         default="contact_area_fraction", description="Result to show."
     )
 
-    def study_problems(self, campaign, study):
-        """Also yield a problem for a quantity of a loop if the study does not unload."""
-        yield from super().study_problems(campaign, study)
+    def _option_problems(self, campaign, study):
+        yield from super()._option_problems(campaign, study)
         if self.quantity in ESTIMATED_OF_LOOPS and not study.unload:
             yield ("quantity",), self.quantity, "is a quantity of a loop; expected a study with `unload: true`"
 
@@ -420,9 +377,8 @@ class OwnFigure(StudyFigure):
         "modules in its folder. The path is relative to the configuration file."
     )
 
-    def inputs(self, campaign, files):
-        """Also return the path of the script."""
-        return super().inputs(campaign, files) | {"script": self.script}
+    def _inputs(self, campaign, files):
+        return super()._inputs(campaign, files) | {"script": self.script}
 
     def arguments(self, campaign):
         """Return the name of the study; the script is an input."""
@@ -499,5 +455,6 @@ class Figures(Section):
 def drawing(campaign: Campaign, name: str, files: results.ResultFiles) -> dict[str, Any]:
     """Return the arguments of `icha.figures.registry.draw_figure` for a figure, without the paths of its files."""
     request = campaign.figures.by_name()[name]
-    data, arguments = request.inputs(campaign, files), request.arguments(campaign)
-    return {"name": name, "inputs": data, "arguments": arguments, "studies": request.studies_of(campaign)}
+    studies = tuple(dict.fromkeys(study for _, study in request.studies_by_key()))
+    data, arguments = request._inputs(campaign, files), request.arguments(campaign)
+    return {"name": name, "inputs": data, "arguments": arguments, "studies": studies}
