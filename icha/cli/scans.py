@@ -72,8 +72,8 @@ def _reading(scan, to_scale: bool) -> Iterator[str]:
     """Yield lines on the format of the file, on points without a height, and on opposite edges that do not fit."""
     share = formatting.share(scan.filled, scan.points)
     filled = f"heights of {format_count(scan.filled, 'point')} interpolated ({share} of the square)"
-    array = f", `data: {printable(scan.data)}`, one of several" if scan.data else ""
-    yield f"read as {scan.format}{array}, {filled if scan.filled else 'all points have a height'}"
+    array = f", `data: {printable(scan.square.data)}`, one of several" if scan.square.data else ""
+    yield f"read as {scan.square.format}{array}, {filled if scan.filled else 'all points have a height'}"
     points = scan.reading.partition(", ")[2]
     # Without units, sizes would be assumptions.
     yield points if to_scale else points.partition(";")[0]
@@ -164,9 +164,9 @@ def _noise(scan) -> Iterator[str]:
         )
         if scan.filled:
             yield "interpolated heights also contribute to the noise floor"
-        if scan.cutoff:
+        if scan.settings.cutoff:
             yield (
-                f"with `cutoff: {formatting.length(scan.cutoff)}`, noise contributes "
+                f"with `cutoff: {formatting.length(scan.settings.cutoff)}`, noise contributes "
                 f"{scan.noise_share_after_filter:.0%} of the mean square slope"
             )
     if scan.advice:

@@ -194,21 +194,21 @@ def read_spectrum_table(
     if units := _units_of(words, remarks):
         if convention is None and units.angle != "rad":
             raise UnfitTopography(
-                "convention",
                 f"is missing, and the titles state {units.text} without rad, so the first column may be q or f = "
                 f"q/(2 pi); expected one of {', '.join(CONVENTIONS)}",
+                "convention",
             )
         excluded = "rad" if chosen.wave_factor > 1 else "cycles"
         if units.angle == excluded or units.exponent not in (None, chosen.dimension + 2):
             raise UnfitTopography(
-                "convention",
                 f"is {convention or 'missing'}, but the titles state {units.text}; expected another of "
                 f"{', '.join(CONVENTIONS)}",
+                "convention",
             )
         stated = units.per_length, units.power or units.per_length ** -(chosen.dimension + 2)
         if length_unit and not np.allclose(stated, [per_length, power_unit], rtol=1e-6, atol=0):
             raise UnfitTopography(
-                "length_unit", f"does not agree with the titles, which state {units.text}. Remove the key"
+                f"does not agree with the titles, which state {units.text}. Remove the key", "length_unit"
             )
         per_length, power_unit = stated
     else:
@@ -217,9 +217,9 @@ def read_spectrum_table(
             found = power_of_length(name)
             if found and found[1] == 1 and not math.isclose(found[0], unit):
                 raise UnfitTopography(
-                    "length_unit",
                     f"is {f'{unit:g} m' if length_unit else 'missing'}, but the heading states {line[:60]!r}; expected "
                     f"{name}, with q in rad/{name}, or titles with units, such as q (rad/um), C (um^4)",
+                    "length_unit",
                 )
     q, power = numbers_of(rows, {0: "1", 1: "2"})
     q, power = q * per_length * chosen.wave_factor, power * power_unit * chosen.power_factor

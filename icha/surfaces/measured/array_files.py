@@ -97,8 +97,8 @@ def _choose_map(shapes: Mapping[str, tuple[int, ...]], settings, what: str, usua
     asked = (settings.data or "").strip("/")
     if asked in shapes and not _is_map(shapes[asked]):
         raise UnfitTopography(
-            "data",
             f"has {len(shapes[asked])} dimensions; expected two, as in {', '.join(maps) or f'no {what} of this file'}",
+            "data",
         )
     name = asked if asked in shapes else _choose_name(asked or None, maps, usual, what)
     return name, name if len(maps) > 1 else ""
@@ -114,7 +114,7 @@ def _choose_name(asked: str | None, names: Sequence[str], usual: Sequence[str], 
             return name
     given = f"is not a {what} of the file" if asked else f"is missing, and the file has {len(names) or 'no'} {what}s"
     expected = f"one of: {', '.join(names)}" if names else f"a file with a {what} of two dimensions"
-    raise UnfitTopography("data", f"{given}; expected {expected}")
+    raise UnfitTopography(f"{given}; expected {expected}", "data")
 
 
 def _read_variable(variable) -> np.ndarray:
@@ -164,7 +164,7 @@ def _side(coordinate, count):
         return None, False
     step = (values[-1] - values[0]) / (count - 1)
     if not np.max(np.abs(values - values[0] - step * np.arange(count))) <= OFF_GRID * abs(step) > 0:
-        raise UnfitTopography("path", f"has coordinates {coordinate.name} with unequal steps; expected equal steps")
+        raise UnfitTopography(f"has coordinates {coordinate.name} with unequal steps; expected equal steps")
     return (count * abs(step) * unit if unit is not None else None), step < 0
 
 
@@ -328,7 +328,7 @@ def read_instrument(file, settings: Preparation) -> FileContent:
     if opened is None or (
         opened.format() in _WITHOUT_SIGNATURE and file.path.suffix.lower()[1:] not in opened.file_extensions()
     ):
-        raise UnfitTopography("path", _UNKNOWN)
+        raise UnfitTopography(_UNKNOWN)
     channel, data = _choose_channel(opened, settings)
     sized = channel.physical_sizes is not None
     topography = channel.topography(**({} if sized else {"physical_sizes": (1.0, 1.0)}))
@@ -353,6 +353,6 @@ def _choose_channel(opened, settings):
     if channel.dim != 2:
         areal = [each.name for each in channels if each.dim == 2]
         if not areal:
-            raise UnfitTopography("path", LINE_SCAN.format(max(channel.nb_grid_pts)))
-        raise UnfitTopography("data", f"is a line scan; expected a topography: {', '.join(areal)}")
+            raise UnfitTopography(LINE_SCAN.format(max(channel.nb_grid_pts)))
+        raise UnfitTopography(f"is a line scan; expected a topography: {', '.join(areal)}", "data")
     return channel, channel.name if len(maps) > 1 else ""

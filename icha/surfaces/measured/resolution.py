@@ -51,12 +51,10 @@ class ScanResolution(PreparedTopography):
     Attributes
     ----------
     measured : square that is cut out of the scan, before filter, treatment of edges and change of grid.
-    cutoff : nesting index of the filter, m; None without a filter.
     settings : settings of the preparation.
     """
 
     measured: Surface
-    cutoff: float | None
     settings: Preparation
 
     @cached_property
@@ -75,7 +73,7 @@ class ScanResolution(PreparedTopography):
         if self.noise is None:
             return 0.0
         q, power, edges = radial_power_spectrum(self.measured)
-        slopes = q**2 * np.diff(edges**2) * 4.0 ** -((self.cutoff * q / (2 * np.pi)) ** 2)
+        slopes = q**2 * np.diff(edges**2) * 4.0 ** -((self.settings.cutoff * q / (2 * np.pi)) ** 2)
         floor = np.minimum(power, (self.noise.rms * self.measured.spacing / (2 * math.pi)) ** 2)
         return float(np.sum(slopes * floor) / np.sum(slopes * power))
 
@@ -114,7 +112,7 @@ class ScanResolution(PreparedTopography):
     def advice(self) -> dict[str, float | int]:
         """Recommended `cutoff` (m) and `grid` for a grid that resolves the surface; empty if no change is needed."""
         found = {}
-        cutoff, pixel = self.cutoff or 0.0, self.measured.spacing
+        cutoff, pixel = self.settings.cutoff or 0.0, self.measured.spacing
         noise = self.noise if self.noise is not None and self.noise.slope_share >= _NOTICEABLE else None
         if noise is not None and cutoff < noise.wavelength * (1 - 1e-9):
             found["cutoff"] = _rounded_up(max(noise.wavelength, LEAST_PIXELS * pixel))
@@ -145,7 +143,6 @@ def examine_scan(path: str | os.PathLike, preparation: Mapping) -> ScanResolutio
     return ScanResolution(
         **vars(prepared_topography(path, preparation)),
         measured=measured,
-        cutoff=preparation.get("cutoff"),
         settings=Preparation(**preparation),
     )
 

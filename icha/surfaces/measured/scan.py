@@ -79,7 +79,7 @@ class Scan:
 def load_scan(path: Path, settings: Preparation) -> Scan:
     """Read the scan in a file of any supported format; raises UnfitTopography if the file or a setting does not fit."""
     if problem := problem_with_path(path) or ("" if path.stat().st_size else "is empty"):
-        raise UnfitTopography("path", f"{problem}; expected a file of heights")
+        raise UnfitTopography(f"{problem}; expected a file of heights")
     name, found = _read(path, settings)
     unit = settings.height_unit or found.unit
     if unit is None:
@@ -93,9 +93,9 @@ def load_scan(path: Path, settings: Preparation) -> Scan:
         if found.coordinates is None and (one_length or (exchanged and not square)):
             lengths = ", ".join(map(formatting.length, (y, x) if exchanged else (x, x * rows / columns)))
             raise UnfitTopography(
-                "size",
                 f"makes pixels of {formatting.length(x / columns)} x {formatting.length(y / rows)}; expected two "
                 f"lengths along x and y, [{lengths}] for square pixels, or the other `first_axis`",
+                "size",
             )
     if size is None and found.coordinates is not None:
         if settings.lateral_unit is None:
@@ -107,9 +107,9 @@ def load_scan(path: Path, settings: Preparation) -> Scan:
         size[0] * found.coordinates[1], size[1] * found.coordinates[0], rtol=_PROPORTIONS, atol=0
     ):
         raise UnfitTopography(
-            "size",
             "does not have the proportions {:.4g} : {:.4g} of the coordinates; expected two lengths along x and y, or "
             "the key `lateral_unit` instead".format(*found.coordinates),
+            "size",
         )
     if size is None:
         raise _missing("size", "the size of the scan; expected a length such as '90 um'")
@@ -133,13 +133,13 @@ def load_scan(path: Path, settings: Preparation) -> Scan:
     heights[np.isinf(heights)] = np.nan
     scan = Scan(heights, tuple(size), steps, format_, found.data)
     if not all(np.isfinite(each) and LENGTH.contains(each) for each in size):
-        raise UnfitTopography("size", f"is {size[0]:g} m by {size[1]:g} m in the file; expected the size in this key")
+        raise UnfitTopography(f"is {size[0]:g} m by {size[1]:g} m in the file; expected the size in this key", "size")
     return scan
 
 
 def _missing(key, value):
     """Return the error for a missing key, whose value the file does not contain either."""
-    return UnfitTopography(key, f"is missing, and the file does not contain {value}")
+    return UnfitTopography(f"is missing, and the file does not contain {value}", key)
 
 
 def read_height_map(path: str | Path, metres_per_unit: float) -> np.ndarray:
@@ -176,34 +176,32 @@ def _read(path, settings):
     except UnfitTopography:
         raise
     except RefusedFile as error:
-        raise UnfitTopography("path", str(error)) from None
+        raise UnfitTopography(str(error)) from None
     except Exception:  # libraries raise many types of errors for files that are damaged or of another format
         as_format = "" if name in ("auto", "text") else f" as {name}"
         raise UnfitTopography(
-            "path",
             f"cannot be read{as_format}: the file is damaged or of another format; expected a sound file, or another "
-            "`format`",
+            "`format`"
         ) from None
     if settings.data is not None and name not in _LIBRARIES:
         raise UnfitTopography(
-            "data", f"is given, but a file of format {name} has one array without a name. Remove the key"
+            f"is given, but a file of format {name} has one array without a name. Remove the key", "data"
         )
     heights = found.heights
     if heights.dtype.kind not in "iuf":
-        raise UnfitTopography("path", f"contains {heights.dtype}, not real numbers; expected heights")
+        raise UnfitTopography(f"contains {heights.dtype}, not real numbers; expected heights")
     if heights.ndim == 1 or (heights.ndim == 2 and 0 < min(heights.shape) <= 2 < max(heights.shape)):
         # An array of two columns contains x and z of a profile.
-        raise UnfitTopography("path", LINE_SCAN.format(max(heights.shape)))
+        raise UnfitTopography(LINE_SCAN.format(max(heights.shape)))
     if heights.ndim == 2 and min(heights.shape) == 3 < max(heights.shape) and found.size is None:
         raise UnfitTopography(
-            "path",
             f"has an array of shape {heights.shape}, which seems to be points x y z; expected rows and columns of "
-            "heights, or `format: xyz` and a text file with x, y and z in every line (`numpy.savetxt`)",
+            "heights, or `format: xyz` and a text file with x, y and z in every line (`numpy.savetxt`)"
         )
     if heights.ndim != 2 or not heights.size:
-        raise UnfitTopography("path", f"has an array of shape {heights.shape}; expected rows and columns of heights")
+        raise UnfitTopography(f"has an array of shape {heights.shape}; expected rows and columns of heights")
     if found.first_axis == "y" and settings.first_axis == "x":
-        raise UnfitTopography("first_axis", "is x, but the file states which of its axes is x. Remove the key")
+        raise UnfitTopography("is x, but the file states which of its axes is x. Remove the key", "first_axis")
     if "x" in (found.first_axis, settings.first_axis):
         sides = {name: getattr(found, name) and getattr(found, name)[::-1] for name in ("size", "coordinates")}
         found = replace(found, heights=heights.T, **sides)

@@ -29,36 +29,17 @@ OFF_GRID = 0.05
 class UnfitTopography(ValueError):
     """Error: a file is not a topography, or the setting `key` does not fit the file."""
 
-    def __init__(self, key: str, message: str):
-        """Store the key, and the message with the reason and the expected value."""
+    def __init__(self, message: str, key: str = "path"):
+        """Store the message, with the reason and the expected value, and the key."""
         super().__init__(message)
         self.key = key
 
 
 @dataclass(frozen=True)
 class Preparation:
-    """Settings for reading a topography from a file and preparing a surface from it.
+    """Settings for reading a topography from a file and preparing a surface from it, in SI units.
 
-    Parameters
-    ----------
-    format : format of the file, a name of `READERS`, or "auto".
-    boundary : "periodic", "window", "mirror" or "free".
-    data : name of the variable, dataset or channel to read; None if the file has only one, or has a default.
-    first_axis : "y" or "x", the first axis of arrays whose dimensions have no names.
-    height_unit : unit of the heights, m; None for the unit in the file.
-    lateral_unit : unit of the coordinates, m; None for the unit in the file.
-    size : sides (x, y) of the whole scan, m, or one length for equal sides; None for the size in the file.
-    touches_first : "high" or "low": points with high or with low numbers touch the elastic body first.
-    missing : treatment of points without a height, "refuse" or "fill".
-    crop : x, y and side (m) of the square to cut out; None for the largest square in the middle of the scan.
-    outliers : treatment of outliers, "keep" or "remove".
-    levelling : "none", or "lines" or "columns": remove offsets between the lines of points along x or y.
-    detrend : trend to remove, "none", "tilt" or "curvature".
-    cutoff : nesting index of the S-filter, m; None for no filter.
-    taper : width, divided by the side, of the strip at each edge in which the window reduces the heights.
-    grid : nodes along a side of the surface; None for the number of nodes of the scan.
-    columns : numbers (from 1) of the columns with x, y and z in a text file; None if the file has only three columns.
-    scattered : treatment of points on no regular grid, "refuse" or "interpolate".
+    They are the keys of `icha.configuration.surfaces.MeasuredSurface`, which explains them.
     """
 
     format: str
@@ -124,9 +105,9 @@ def grid_indices(values: np.ndarray, axis: str) -> tuple[np.ndarray, int, float]
         if count <= GRID.most and np.max(np.abs(values - low - index * step)) <= OFF_GRID * step:
             return index.astype(int), count, step
     raise UnfitTopography(
-        "scattered",
         f"does not allow coordinates {axis} that are not on a regular grid of at most {GRID.most} points; expected "
         "interpolate, or a file with rows and columns of points",
+        "scattered",
     )
 
 
@@ -142,9 +123,9 @@ def unused_factors(entries: Iterable[tuple[str, ...]], settings: Preparation) ->
     ]
     if found and settings.height_unit is None:
         raise UnfitTopography(
-            "height_unit",
             f"is missing, and the file states {', '.join(found)!r}, which may be a factor of the heights; expected the "
             "unit of the numbers in the file, such as '0.5 nm' with a factor, or 'nm' if the factor is already applied",
+            "height_unit",
         )
     return f"not applied: {', '.join(found)}" if found else ""
 

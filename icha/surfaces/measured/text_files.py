@@ -89,9 +89,8 @@ def format_of_text(file: SourceFile) -> str:
         return "xyz"
     if sum(bool(_QUANTITIES.search(title)) for title in titles) > 1:
         raise UnfitTopography(
-            "path",
             f"is a table of {', '.join(titles)[:80]}; expected heights over x and y. Measured loads and areas belong "
-            "to the section `measurements`",
+            "to the section `measurements`"
         )
     # Headings from instruments contain lines that are not remarks.
     if _INSTRUMENT.search("\n".join(layout.heading)) or (
@@ -105,15 +104,14 @@ def read_matrix(file: SourceFile, settings: Preparation) -> FileContent:
     """Read a text file with a row of heights in every line; units, size and missing heights come from its heading."""
     heights, heading = file.values, _Heading(file.table_layout)
     if "".join(heading.lines[:1]).startswith("Zygo "):
-        raise UnfitTopography("path", "is a Zygo file without points x y z; expected another export, such as XYZ")
+        raise UnfitTopography("is a Zygo file without points x y z; expected another export, such as XYZ")
     file.refuse_blocks()
     if not (heading.agrees_with(heights.shape) or heading.is_image):
         refuse_coordinates(heights)
         if file.ends_with_delimiters and len(heights) != len(heights.T):
             raise UnfitTopography(
-                "path",
                 "has a delimiter at the end of every line; the last column may be missing heights, or no column. "
-                "Remove these delimiters, or write nan for missing heights",
+                "Remove these delimiters, or write nan for missing heights"
             )
     size, coordinates = heading.find_size(heights.shape, settings)
     remark, unit = heading.unused_factors(settings), heading.find_height_unit(settings)
@@ -126,17 +124,20 @@ def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
     titles, count = _find_titles(layout), file.values.shape[1]
     titled, units = _read_titles(titles)
     columns = list(settings.columns or titled or (1, 2, 3))
-    if settings.columns is None and not titled:
-        _ask_for_columns(count, titles)
+    if settings.columns is None and not titled and (count != 3 or titles):
+        stated = f"the columns are {', '.join(titles)[:80]}" if titles else f"lines have {count} numbers"
+        raise UnfitTopography(
+            f"is missing, and {stated}; expected the columns x, y and z, such as [1, 2, 3]", "columns"
+        )
     if max(columns) > count:
-        raise UnfitTopography("columns", f"is larger than the number of columns; expected 1 to {count}")
+        raise UnfitTopography(f"is larger than the number of columns; expected 1 to {count}", "columns")
     points = file.values[:, [column - 1 for column in columns]]
     placed = np.isfinite(points[:, :2]).all(axis=1)
     if np.isfinite(points[~placed, 2]).any():
-        raise UnfitTopography("path", "has a height without coordinates; expected x, y and z in every line")
+        raise UnfitTopography("has a height without coordinates; expected x, y and z in every line")
     without_place, points = np.count_nonzero(~placed), points[placed]
     if len(points) > 1 and any(np.ptp(points[:, axis]) == 0 for axis in (0, 1)):
-        raise UnfitTopography("path", LINE_SCAN.format(len(points)))
+        raise UnfitTopography(LINE_SCAN.format(len(points)))
     scattered = ""
     try:
         grid = [grid_indices(points[:, axis], "xy"[axis]) for axis in (0, 1)]
@@ -144,9 +145,9 @@ def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
         sparse = any(len(np.unique(index)) < count for index, count, _ in grid)
         if sparse and (settings.missing == "refuse" or settings.scattered == "interpolate"):
             raise UnfitTopography(
-                "scattered",
                 f"does not allow coordinates on a grid of {grid[0][1]} x {grid[1][1]} points that lack whole rows or "
                 "columns, as rounded coordinates do; expected interpolate, or `missing: fill` if points are missing",
+                "scattered",
             )
     except UnfitTopography:
         if settings.scattered != "interpolate":
@@ -159,12 +160,11 @@ def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
     repeated = np.flatnonzero(np.diff(node[order]) == 0)
     if len(repeated):
         x, y = points[order[repeated[0]], :2]
-        raise UnfitTopography("path", f"contains the point x = {x:g}, y = {y:g} twice; expected every point once")
+        raise UnfitTopography(f"contains the point x = {x:g}, y = {y:g} twice; expected every point once")
     if without_place > nx * ny - len(points) and not scattered:
         raise UnfitTopography(
-            "path",
             f"has {without_place} lines without coordinates, but the grid of the other lines lacks "
-            f"{nx * ny - len(points)} points, so the edge of the scan is not known. Remove the lines, or add x and y",
+            f"{nx * ny - len(points)} points, so the edge of the scan is not known. Remove the lines, or add x and y"
         )
     heading = _Heading(layout)
     heights = np.full(nx * ny, np.nan)
@@ -230,13 +230,6 @@ def _read_titles(titles):
     return [names.index(axis) + 1 for axis in "xyz"] if unique else [], units
 
 
-def _ask_for_columns(count, titles):
-    """Raise UnfitTopography unless a table has three columns without titles."""
-    if count != 3 or titles:
-        lines = f"the columns are {', '.join(titles)[:80]}" if titles else f"lines have {count} numbers"
-        raise UnfitTopography("columns", f"is missing, and {lines}; expected the columns x, y and z, such as [1, 2, 3]")
-
-
 class _Heading:
     """Units, size and missing heights in the lines above a table.
 
@@ -286,9 +279,9 @@ class _Heading:
                 continue
             if not found[2] or metres_of(found[2]) or found[2] in ("x", "X", "×", "*"):
                 raise UnfitTopography(
-                    key,
                     f"is missing; the heading states {stated!r}, but also {line.strip()[:60]!r}, which may change it. "
                     "Give the value for the table of numbers in this key",
+                    key,
                 )
 
     def agrees_with(self, shape: tuple[int, int]) -> bool:
@@ -298,10 +291,9 @@ class _Heading:
             if axis in counts and value.isdecimal():
                 if int(value) != counts[axis]:
                     raise UnfitTopography(
-                        "path",
                         f"has {counts[axis]} {axis} of numbers, but its heading states {value} in "
                         f"{line.strip()[:40]!r}; expected a whole table. Export the table again, or correct or remove "
-                        "this line",
+                        "this line"
                     )
                 agreed.add(axis)
         return len(agreed) == 2
@@ -311,9 +303,9 @@ class _Heading:
         for name, value, line in self.entries:
             if settings.touches_first == "high" and _DIRECTION.search(name) and _DOWNWARDS.search(value):
                 raise UnfitTopography(
-                    "touches_first",
                     f"is 'high', but the heading states {line.strip()[:60]!r}, so that points with high numbers are "
                     "valleys; expected 'low'. If the numbers increase upwards, remove this line from the file",
+                    "touches_first",
                 )
         return unused_factors(self.entries, settings)
 
@@ -359,7 +351,7 @@ class _Heading:
                 f"is missing, and the lengths in the heading, {stated}, do not fit {columns} x {rows} square pixels"
             )
         if settings.size is None:
-            raise UnfitTopography("size", f"{problem}. Give the size in this key")
+            raise UnfitTopography(f"{problem}. Give the size in this key", "size")
         return None, None
 
 
@@ -367,7 +359,7 @@ def _agreed(key, texts, given):
     """Return the unit of length that all texts name; None without a unit."""
     units = sorted({unit for unit in map(metres_of, texts) if unit})
     if len(units) > 1 and given is None:
-        raise UnfitTopography(key, f"is missing, and the file states {' and '.join(texts)}; expected one unit")
+        raise UnfitTopography(f"is missing, and the file states {' and '.join(texts)}; expected one unit", key)
     return units[0] if units else None
 
 

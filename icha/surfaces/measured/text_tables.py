@@ -87,9 +87,8 @@ class SourceFile:
         """Heading and notation; raises UnfitTopography if the file has no numbers."""
         if self.layout is None:
             raise UnfitTopography(
-                "path",
                 "cannot be read as a table, because it has no numbers; expected a row of heights, or x y z, in "
-                "every line",
+                "every line"
             )
         return self.layout
 
@@ -119,9 +118,8 @@ class SourceFile:
         numbers = np.concatenate(values)
         if excess := numbers.size % layout.fields:
             raise UnfitTopography(
-                "path",
                 f"has {excess} numbers in the last row, but its heading states {layout.fields}; expected a whole "
-                "table. Export the table again",
+                "table. Export the table again"
             )
         return numbers.reshape(-1, layout.fields)[:, : layout.fields - ends], np.concatenate(lines), ends
 
@@ -137,9 +135,8 @@ class SourceFile:
                     continue
                 if len(fields) != layout.fields and not layout.wrapped:
                     raise UnfitTopography(
-                        "path",
                         f"has {len(fields)} numbers in line {line} but {layout.fields} in most lines; expected rows of "
-                        "one length. Complete or remove the line; missing heights may be NaN",
+                        "one length. Complete or remove the line; missing heights may be NaN"
                     )
                 yield line, fields
 
@@ -152,10 +149,9 @@ class SourceFile:
         begins = np.flatnonzero(np.diff(lines) > 1) + 1
         if not self.table_layout.wrapped and len(begins) and min(np.diff([0, *begins, len(lines)])) > 1:
             raise UnfitTopography(
-                "path",
                 f"has {len(begins) + 1} blocks of rows, the second from line {lines[begins[0]]}; expected one "
                 "image. Remove all blocks but one. If the blocks form one image, remove the lines between the "
-                "blocks instead",
+                "blocks instead"
             )
 
     @cached_property
@@ -202,9 +198,8 @@ def _read_numbers(rows, decimal):
         places = [(line, column, field) for line, fields in rows for column, field in enumerate(fields, 1)]
         line, column, field = places[wrong[0]]
         raise UnfitTopography(
-            "path",
             f"has {field[:40]!r} in line {line}, column {column}; expected a number, or NaN where a point is missing. "
-            "Correct or remove the line",
+            "Correct or remove the line"
         )
     return numbers
 
@@ -277,9 +272,8 @@ def _find_delimiter(text):
         if not wrong and not np.isnan(numbers).all():
             if delimiter == " " and re.search(r"[^\S ]", text):
                 raise UnfitTopography(
-                    "path",
                     f"has different blanks in a row, {text[:40]!r}, so blanks may separate thousands or "
-                    "columns; expected numbers without blanks, and one delimiter between them",
+                    "columns; expected numbers without blanks, and one delimiter between them"
                 )
             return delimiter
     return None
@@ -314,9 +308,8 @@ def _find_decimal_sign(first, rows, delimiter):
     ambiguous = delimiter != "," and with_point and all(map(_AMBIGUOUS_POINT.fullmatch, with_point))
     if ambiguous and not any(map(_PLAIN_THOUSANDS.fullmatch, fields)):
         raise UnfitTopography(
-            "path",
             f"has points, as in {with_point[0]!r}, that may separate thousands: each has three digits after it. Remove "
-            f"the points if so; if they are decimal signs, add a digit to one number, as in '{with_point[0]}0'",
+            f"the points if so; if they are decimal signs, add a digit to one number, as in '{with_point[0]}0'"
         )
     with_comma = [field for field in fields if "," in field]
     numbers = re.split(r",?\s+", first.strip())
@@ -326,9 +319,8 @@ def _find_decimal_sign(first, rows, delimiter):
         or (delimiter == "," and not with_comma and _are_halves_of_decimals(rows))
     ):
         raise UnfitTopography(
-            "path",
             f"has commas, as in {(with_comma or [first])[0][:40]!r}, that may be decimal signs, delimiters, or "
-            "separate thousands; expected decimal points. Replace or remove the commas",
+            "separate thousands; expected decimal points. Replace or remove the commas"
         )
     return "," if with_comma and not with_point else "."
 
@@ -366,10 +358,9 @@ def refuse_coordinates(values: np.ndarray) -> None:
                 body = (similar if similar[k] else monotonic)[1:-1]
                 if 2 * np.sum(body) < len(body) if similar[k] else monotonic[k] and not np.any(body):
                     raise UnfitTopography(
-                        "path",
                         f"has a {place} {name} of numbers, {', '.join(f'{x:g}' for x in table[k][1:4])} …, that seem "
                         f"to be coordinates or numbers of points. Remove the {name} if so, or save all numbers as a "
-                        ".npy file if they are heights",
+                        ".npy file if they are heights"
                     )
 
 

@@ -32,7 +32,6 @@ from icha.surfaces.measured.defects import (
 )
 from icha.surfaces.measured.scan import Scan, load_scan
 from icha.surfaces.measured.settings import MIRROR, WINDOW, Preparation, UnfitTopography
-from icha.surfaces.square import problem_with_heights
 from icha.surfaces.surface import FREE, PERIODIC, Surface
 
 # Relative rounding error of the quotient of two lengths.
@@ -57,8 +56,6 @@ class PreparedTopography:
     ----------
     source_file, source_sha256 : name of the file and SHA-256 of its content.
     description : all steps from the file to the surface, as text for users.
-    format : format with which the file was read.
-    data : name of the array or channel that was read; empty if the file has only one.
     reading : points, pixels, units and omitted parts of the file, as text for users.
     filled : number of missing points that were filled.
     points : number of points in the whole square, not along a side, before resampling.
@@ -69,8 +66,6 @@ class PreparedTopography:
     source_file: str
     source_sha256: str
     description: str
-    format: str
-    data: str
     reading: str
     filled: int
     points: int
@@ -110,8 +105,6 @@ def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> Prepar
         source_file=file.name,
         source_sha256=sha256_of(file),
         description="; ".join(steps),
-        format=scan.format,
-        data=scan.data,
         reading="; ".join([scan.steps[0], *(step for step in steps if "resampled" in step)]),
         filled=int(np.count_nonzero(~np.isfinite(square.heights))),
         points=square.heights.size,
@@ -136,19 +129,18 @@ def crop_square(scan: Scan, settings: Preparation) -> Scan:
         nx, ny = round(side / dx), round(side / dy)
         if first_x + nx > columns or first_y + ny > rows:
             raise UnfitTopography(
-                "crop",
                 f"ends at x = {formatting.length(x + side)}, y = {formatting.length(y + side)}, outside the "
                 f"scan; expected at most x = {width}, y = {height}",
+                "crop",
             )
     if nx < 8 or ny < 8:
         raise UnfitTopography(
-            "crop" if settings.crop else "path",
-            f"gives a square of {nx} x {ny} points; expected at least 8 x 8",
+            f"gives a square of {nx} x {ny} points; expected at least 8 x 8", "crop" if settings.crop else "path"
         )
     if settings.boundary == PERIODIC and ((nx, ny) != (columns, rows) or abs(nx * dx / (ny * dy) - 1) > SQUARE):
         raise UnfitTopography(
-            "boundary",
             f"requires a square scan that is not cropped; the scan is {width} x {height}; expected another boundary",
+            "boundary",
         )
     square = scan.heights[first_y : first_y + ny, first_x : first_x + nx]
     step = [] if square.shape == scan.heights.shape else [f"cut to {nx} x {ny} points from ({first_x}, {first_y})"]
@@ -163,9 +155,9 @@ def remove_outliers(scan: Scan, settings: Preparation) -> Scan:
     count = int(np.count_nonzero(outliers))
     if count > MOST_OUTLIERS * outliers.size:
         raise UnfitTopography(
-            "outliers",
             f"cannot remove {count} of {outliers.size} points that stand out from the points around them; expected at "
             f"most {100 * MOST_OUTLIERS:g} %. Write keep if they belong to the surface, or crop the scan",
+            "outliers",
         )
     if not count:
         return scan
@@ -200,7 +192,7 @@ def remove_trend(scan: Scan, settings: Preparation) -> Scan:
     """Remove the plane or the paraboloid that fits the known heights best."""
     known = np.isfinite(scan.heights)
     if not known.any():
-        raise UnfitTopography("path", "has no height within the square that is used; expected another crop or file")
+        raise UnfitTopography("has no height within the square that is used; expected another crop or file")
     degree = {"none": 0, "tilt": 1, "curvature": 2}[settings.detrend]
     if degree == 0:
         return scan
@@ -212,7 +204,7 @@ def refuse_flat(prepared: Scan, cleaned: Scan, settings: Preparation) -> None:
     known = np.isfinite(cleaned.heights)
     if np.ptp(prepared.heights) <= _FLAT * np.nanmax(np.abs(cleaned.heights), where=known, initial=0.0):
         apart = "" if settings.detrend == "none" else ", apart from the trend that is removed"
-        raise UnfitTopography("path", f"contains heights that are all the same{apart}; expected a rough surface")
+        raise UnfitTopography(f"contains heights that are all the same{apart}; expected a rough surface")
 
 
 def fill_missing_points(scan: Scan, settings: Preparation) -> Scan:
@@ -223,12 +215,12 @@ def fill_missing_points(scan: Scan, settings: Preparation) -> Scan:
         return scan
     if settings.missing == "refuse":
         raise UnfitTopography(
-            "missing",
             f"does not allow {count} of {missing.size} points without a height; expected fill, or a crop without such "
             "points",
+            "missing",
         )
     if 2 * count > missing.size:
-        raise UnfitTopography("missing", f"cannot fill {count} of {missing.size} points; expected at most half")
+        raise UnfitTopography(f"cannot fill {count} of {missing.size} points; expected at most half", "missing")
     heights = scan.heights.copy()
     heights[missing] = _harmonic(heights, missing, periodic=settings.boundary == PERIODIC)
     return scan.after(heights, f"{count} missing points filled, {formatting.share(count, missing.size)} of the points")
@@ -304,10 +296,10 @@ def filter_short_waves(scan: Scan, settings: Preparation) -> Scan:
     least, most = LEAST_PIXELS * max(scan.pixel), min(scan.size)
     if not least * (1 - 1e-9) <= settings.cutoff <= most:
         raise UnfitTopography(
-            "cutoff",
             f"is {settings.cutoff / max(scan.pixel):.3g} pixels; expected at least "
             f"{LEAST_PIXELS} pixels ({formatting.length(least)}), at most the side of the square "
             f"({formatting.length(most)})",
+            "cutoff",
         )
     dx, dy = scan.pixel
     sigma = DEVIATION * settings.cutoff
@@ -326,7 +318,7 @@ def treat_edges(scan: Scan, square: Scan, settings: Preparation) -> tuple[Surfac
         # Resampling copies the heights.
         require_room(3 * 8 * nodes**2)
     except TooLarge as error:
-        raise UnfitTopography("grid", f"gives a surface of {nodes} x {nodes} points, which {error}") from None
+        raise UnfitTopography(f"gives a surface of {nodes} x {nodes} points, which {error}", "grid") from None
     heights, side, free = scan.heights - np.mean(scan.heights), scan.size[0], settings.boundary == FREE
     steps = list(scan.steps)
     if settings.boundary == WINDOW:
@@ -344,8 +336,6 @@ def treat_edges(scan: Scan, square: Scan, settings: Preparation) -> tuple[Surfac
     if heights.shape != (grid, grid):
         heights = _resampled(heights, grid, free=free)
         steps.append(f"resampled to {grid} x {grid} points")
-    if problem := problem_with_heights(heights):
-        raise UnfitTopography("path", f"contains {problem}")
     steps.append("one square on a free half-space" if free else f"repeats after {side:.6g} m")
     try:
         return Surface(heights, side, FREE if free else PERIODIC), steps
@@ -354,13 +344,13 @@ def treat_edges(scan: Scan, square: Scan, settings: Preparation) -> tuple[Surfac
         if settings.outliers == "keep" and outliers.any():
             row, column = (int(each[0]) + 1 for each in np.nonzero(outliers))
             raise UnfitTopography(
-                "outliers",
                 f"keeps {np.count_nonzero(outliers)} points that stand out by up to {largest:.3g} rms heights, the "
                 f"first in row {row}, column {column} of the square, and contact models do not accept such heights; "
                 "expected remove, or a crop without these points",
+                "outliers",
             ) from None
         raise UnfitTopography(
-            "height_unit", f"gives heights that contact models do not accept ({error}); expected another unit"
+            f"gives heights that contact models do not accept ({error}); expected another unit", "height_unit"
         ) from None
 
 
