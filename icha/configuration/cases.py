@@ -30,7 +30,9 @@ def surface_settings(campaign: Campaign, name: str) -> dict:
         settings = surface.model_dump(exclude_none=True, exclude={"path", "boundary", "shape"})
     else:
         settings = {"kind": surface.kind, "period": surface.period, "metres_per_unit": surface.height_unit}
-    return settings | surface.boundary_and_shape
+    # Defaults are left out, so that old settings keep their checksums.
+    shape = {"shape": surface.shape.model_dump(exclude_none=True)} if surface.shape else {}
+    return settings | ({"boundary": "free"} | shape if surface.free else {})
 
 
 def run_settings(campaign: Campaign, case: RunLabels) -> dict:

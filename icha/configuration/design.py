@@ -68,8 +68,10 @@ def expand_design(campaign: Campaign, content: Mapping, folders: Folders) -> tup
     for label, study in campaign.studies.items():
         levels = study.seeds_of_levels
         if study.sample is not None and levels is not None:
-            sampled = _study_of_inputs(study)
-            name = inputs_study(label)
+            # The sampled parameters have one seed, and the fastest of the models of the levels.
+            models = [DEFAULT_MODEL if levels.asperities else REFERENCE_MODEL]
+            one = {"levels": None, "accuracy": None, "seeds": [min(levels.seeds)], "models": models}
+            sampled, name = study.model_copy(update=one), inputs_study(label)
             runs[name] = [variants.run(name, sampled.models[0], point) for point in _points(label, sampled)]
             studies[name] = sampled
             study = study.model_copy(update={"sample": None})
@@ -89,13 +91,6 @@ def expand_design(campaign: Campaign, content: Mapping, folders: Folders) -> tup
     expanded = campaign.model_copy(update=sections | {"studies": studies}).with_runs(runs)
     expanded._origins = variants.origin
     return expanded, []
-
-
-def _study_of_inputs(study: Study) -> Study:
-    """Return the study of the sampled parameters of a study with levels: one seed, and the fastest of its models."""
-    levels = study.seeds_of_levels
-    models = [DEFAULT_MODEL if levels.asperities else REFERENCE_MODEL]
-    return study.model_copy(update={"levels": None, "accuracy": None, "seeds": [min(levels.seeds)], "models": models})
 
 
 def _runs_of_levels(label, levels, of_model, variants):
@@ -152,22 +147,14 @@ def _too_many_runs(campaign: Campaign) -> Iterator[Problem]:
     """Yield a problem if a campaign that is not yet expanded has too many runs or targets."""
     runs = targets = 0
     for label, study in campaign.studies.items():
-        count, states = _run_count(label, study), {*study.targets.states, *(study.saved_states or ())}
+        # A run that occurs twice counts twice.
+        lists = _lists(label, study)
+        counts = (math.prod(len(lists[name]) for name in lists if name not in given) for given in _cases(study))
+        count, states = len(study.models) * sum(counts), {*study.targets.states, *(study.saved_states or ())}
         runs, targets = runs + count, targets + count * (len(states) + len(study.turning_points))
-    yield from _excess("studies", runs, "runs", MAX_RUNS)
-    yield from _excess("studies", targets, "targets of all runs", _MAX_TARGETS)
-
-
-def _excess(section: str, count: int, what: str, most: int) -> Iterator[Problem]:
-    if count > most:
-        yield (section,), NOTHING, f"defines {count} {what}; expected at most {most}"
-
-
-def _run_count(label: str, study: Study) -> int:
-    """Count the runs of a study with all its models. A run that occurs twice counts twice."""
-    lists = _lists(label, study)
-    counts = (math.prod(len(lists[name]) for name in lists if name not in given) for given in _cases(study))
-    return len(study.models) * sum(counts)
+    for count, what, most in ((runs, "runs", MAX_RUNS), (targets, "targets of all runs", _MAX_TARGETS)):
+        if count > most:
+            yield ("studies",), NOTHING, f"defines {count} {what}; expected at most {most}"
 
 
 def _study_problems(campaign: Campaign, label: str, study: Study) -> Iterator[Problem]:

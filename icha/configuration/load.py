@@ -29,7 +29,7 @@ from icha.configuration.plausibility import (
     unusual_topography,
     unusual_values,
 )
-from icha.configuration.studies import PILOT, Study
+from icha.configuration.studies import PILOT
 from icha.configuration.topographies import inspect_topographies
 from icha.configuration.yaml_files import (
     Source,
@@ -112,7 +112,9 @@ def _load(source: Source, within: str | os.PathLike | None) -> Configuration:
     unusual += mirrored_forces(campaign)
     unusual += coarse_grids(campaign)
     sticky = list(sticky_runs(campaign))
-    if too_sticky := [each for each in sticky if _chooses_levels(campaign.studies[each.location[1]])]:
+    # Studies for which ICHA chooses the levels, and has not chosen yet.
+    undecided = {name for name, each in campaign.studies.items() if each.accuracy is not None and each.levels is None}
+    if too_sticky := [each for each in sticky if each.location[1] in undecided]:
         levels = {each.location[1]: {"levels": _WITHOUT_ASPERITIES} for each in too_sticky}
         found = _load(replace(source, content=merge(source.content, {"studies": levels})), within)
         reason = "is not reached with the asperity model, because {}; boundary elements alone give the estimate"
@@ -133,11 +135,6 @@ def _load(source: Source, within: str | os.PathLike | None) -> Configuration:
         format_problem(source, each.location, each.value, reason.format(each.source, each.usual)) for each in unusual
     ]
     return Configuration(campaign, text, source.name, tuple(accepted))
-
-
-def _chooses_levels(study: Study) -> bool:
-    """Return whether ICHA chooses the levels of a study, and has not chosen yet."""
-    return study.accuracy is not None and study.levels is None
 
 
 # Levels of the pilot of a study with `accuracy` whose surfaces are too sticky for the asperity model.

@@ -205,7 +205,9 @@ def coarse_contacts(campaign: Campaign) -> Iterator[Unusual]:
     for name, study in campaign.studies.items():
         if is_derived_study(name, campaign.studies):
             continue
-        for contact in smooth_contacts(campaign, name):
+        for contact in campaign.runs(name):
+            if not (MODELS[contact.model].by_cells and campaign.surfaces[contact.surface].smooth):
+                continue
             resolution = resolution_of_smooth(campaign, name, contact)
             if not resolution.reaches(LEAST_CELLS):
                 kind, value = study.targets.states[0]
@@ -214,11 +216,6 @@ def coarse_contacts(campaign: Campaign) -> Iterator[Unusual]:
                 expected = f"larger targets, or {resolution.grids(campaign.grid(contact.surface))}"
                 yield Unusual(("studies", name, "targets", QUANTITIES[kind].plural), shown, expected, source)
                 break
-
-
-def smooth_contacts(campaign: Campaign, study: str) -> list[RunLabels]:
-    """Return the runs of smooth shapes that a study computes with boundary elements."""
-    return [run for run in campaign.runs(study) if MODELS[run.model].by_cells and campaign.surfaces[run.surface].smooth]
 
 
 def resolution_of_smooth(campaign: Campaign, study: str, contact: RunLabels) -> Resolution:

@@ -1,5 +1,6 @@
 """Section `publication`: authors, version and other metadata of a deposit."""
 
+import contextlib
 import datetime
 import re
 from collections.abc import Callable, Iterator
@@ -71,28 +72,20 @@ def _doi(value: str) -> str | None:
     return plain if re.fullmatch(rf"10\.[0-9]{{4,9}}/{_ADDRESS}", plain) else None
 
 
-def _date(value: str) -> str | None:
-    """Return the date in a text as year-month-day; None for other texts."""
-    try:
-        return datetime.date.fromisoformat(value).isoformat()
-    except ValueError:
-        return None
-
-
 def _matching(pattern: str) -> Callable[[str], str | None]:
     """Return a function of a text. This function returns the text if it matches `pattern`, otherwise None."""
     return lambda value: value if re.fullmatch(pattern, value) else None
 
 
 def _checked(read: Callable[[str], str | None], what: str, example: str):
-    """Return the type of a checked text; `read` returns the plain form of a text, or None if the text is wrong."""
+    """Return the type of a checked text; `read` returns its plain form, or None or a ValueError if it is wrong."""
 
     def check(value: Any) -> str:
         # The YAML reader turns a date into a `datetime.date`, and a version such as 1.10 into the number 1.1.
-        plain = read(str(value)) if isinstance(value, str | datetime.date) else None
-        if plain is None:
-            raise ValueError(f"is not valid; expected {what}, such as {example!r}")
-        return plain
+        with contextlib.suppress(ValueError):
+            if isinstance(value, str | datetime.date) and (plain := read(str(value))) is not None:
+                return plain
+        raise ValueError(f"is not valid; expected {what}, such as {example!r}")
 
     return Annotated[str, BeforeValidator(check), WithJsonSchema({"type": "string", "examples": [example]})]
 
@@ -104,7 +97,7 @@ Ror = _checked(_ror, "a ROR identifier with the right check digits", _ROR)
 Doi = _checked(_doi, "a DOI", _DOI)
 Identifier = _checked(lambda value: _doi(value) or _web(value), "a DOI, arXiv:1234.56789 or a web address", _DOI)
 FunderId = _checked(lambda value: _doi(value) or _ror(value), "a ROR identifier, or a DOI", "https://ror.org/00k4n6c32")
-Date = _checked(_date, "year, month and day", "2026-01-31")
+Date = _checked(lambda text: datetime.date.fromisoformat(text).isoformat(), "year, month and day", "2026-01-31")
 Community = _checked(_matching(r"[a-z0-9_-]+"), "the end of the address of a Zenodo community", "contact-mechanics")
 # The version is part of the name of a folder.
 Version = _checked(

@@ -269,9 +269,10 @@ class Accuracy(Section):
     many seeds as the budget allows, and prints the accuracy that was reached."""
 
 
-def _short_form(value: Any) -> Any:
-    """Return the section of an accuracy that is given by its half-width alone, such as `3 %`."""
-    return value if isinstance(value, dict | Accuracy | None) else {"half_width": value}
+# An accuracy may be given by its half-width alone, such as `3 %`.
+_ShortForm = BeforeValidator(
+    lambda value: value if isinstance(value, dict | Accuracy | None) else {"half_width": value}
+)
 
 
 class Study(Section):
@@ -312,9 +313,7 @@ class Study(Section):
     levels: Levels | None = None
     """Seeds of three levels of accuracy, instead of `seeds` and `models`. ICHA estimates each result with an interval,
     and `icha answer` prints the estimates."""
-    accuracy: Annotated[
-        Accuracy | None, BeforeValidator(_short_form), OrSchema({"type": "string", "examples": ["3 %"]})
-    ] = None
+    accuracy: Annotated[Accuracy | None, _ShortForm, OrSchema({"type": "string", "examples": ["3 %"]})] = None
     """Accuracy that the results must have, such as `3 %`, instead of `seeds` and `models`. `icha run` computes a pilot
     with few seeds, then the levels that reach the accuracy in the shortest time, and states the result."""
     targets: Targets

@@ -375,25 +375,17 @@ class _Surface(Section):
         """True for a single square, False for a periodic surface."""
         return self.shape is not None or self.boundary == "free"
 
-    @property
-    def boundary_and_shape(self) -> dict:
-        """Boundary and shape in SI units, without defaults, so that old settings keep their checksums."""
-        if not self.free:
-            return {}
-        return {"boundary": "free"} | ({"shape": self.shape.model_dump(exclude_none=True)} if self.shape else {})
-
     @model_validator(mode="after")
     def _check_free(self):
         if self.shape is not None and "boundary" in self.model_fields_set and self.boundary != "free":
             raise ValueError(
                 f"boundary: {self.boundary!r} with a shape; expected free, because a shape does not repeat"
             )
+        # Side and grid of other surfaces are known when their file is read.
+        if self.shape is not None and (self.random or self.smooth):
+            if problem := self.shape.problem(self.period, self.grid):
+                raise ValueError(problem)
         return self
-
-    def _check_shape(self, side, grid):
-        """Raise ValueError if the shape does not fit a square of this side (m) and number of nodes."""
-        if self.shape is not None and (problem := self.shape.problem(side, grid)):
-            raise ValueError(problem)
 
 
 class _SurfaceFromFile(_Surface):
@@ -527,11 +519,6 @@ class SelfAffineSurface(_Surface):
     boundary: Literal["periodic", "free"] = _BOUNDARY
     shape: ShapeSection | None = _SHAPE
 
-    @model_validator(mode="after")
-    def _check_size_of_shape(self):
-        self._check_shape(self.period, self.grid)
-        return self
-
     @property
     def lengths_and_hurst(self) -> tuple[float, float, float, float]:
         """Period, roll-off wavelength and shortest wavelength, m, and Hurst exponent."""
@@ -611,11 +598,6 @@ class SpectrumSurface(_SurfaceFromFile):
     boundary: Literal["periodic", "free"] = _BOUNDARY
     shape: ShapeSection | None = _SHAPE
 
-    @model_validator(mode="after")
-    def _check_size_of_shape(self):
-        self._check_shape(self.period, self.grid)
-        return self
-
 
 class SmoothSurface(_Surface):
     """A shape alone, without roughness. A study uses it once, without seeds and rms slopes."""
@@ -637,11 +619,6 @@ class SmoothSurface(_Surface):
     def period(self) -> float:
         """Side of the square, m."""
         return self.side
-
-    @model_validator(mode="after")
-    def _check_size_of_shape(self):
-        self._check_shape(self.side, self.grid)
-        return self
 
 
 # Classes of the sections of surfaces, by the value of the key `kind`.

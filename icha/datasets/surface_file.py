@@ -119,7 +119,9 @@ def read_surface(path: str | os.PathLike) -> Surface:
 def read_scaled_surface(path: str | os.PathLike, rms_slope: float, rms_height: float | None = None) -> Surface:
     """Read the topography of a surface file, scaled to an rms slope, or to an rms height (m) if one is given."""
     surface = read_surface(path)
-    return surface.scaled_to_rms_slope(rms_slope) if rms_height is None else surface.scaled_to_rms_height(rms_height)
+    if rms_height is not None and not surface.smooth:
+        rms_slope = surface.rms_slope * rms_height / surface.rms_height
+    return surface.scaled_to_rms_slope(rms_slope)
 
 
 def read_spectral_moments(path: str | os.PathLike) -> SpectralMoments:

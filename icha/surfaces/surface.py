@@ -21,7 +21,6 @@ from icha.support.formatting import choose_unit, format_quantity, html_table
 from icha.support.parallel import blocks, on_cores
 from icha.support.rules import LENGTH, SLOPE, FloatRange, IntegerRange
 from icha.support.usual import IchaWarning, unusual_arguments
-from icha.surfaces.square import problem_with_heights
 
 if TYPE_CHECKING:
     from icha.surfaces.shapes import Shape
@@ -100,8 +99,12 @@ class Surface:
             heights = np.array(given, dtype=np.float64, order="C")
         except (TypeError, ValueError) as error:
             raise ValueError(f"heights: must be an array of real numbers in metres ({error})") from None
-        if problem := problem_with_heights(heights, smooth=self.shape is not None):
-            raise ValueError(f"heights: {problem}")
+        if heights.ndim != 2 or heights.shape[0] != heights.shape[1] or heights.shape[0] < 8:
+            raise ValueError(f"heights: an array of shape {heights.shape}; expected a square of at least 8 x 8 heights")
+        if bad := int(np.count_nonzero(~np.isfinite(heights))):
+            raise ValueError(f"heights: {bad} of {heights.size} heights that are not finite; expected numbers")
+        if heights.max() == heights.min() and self.shape is None:
+            raise ValueError("heights: heights that are all the same; expected a rough surface")
         object.__setattr__(self, "period", LENGTH.validate("period", self.period))
         if self.short_wavelength is not None:
             wavelength = LENGTH.validate("short_wavelength", self.short_wavelength)
@@ -230,11 +233,6 @@ class Surface:
         """Unit of slopes: the rms slope; with a shape, `unit_height` divided by the side of the square."""
         return self._units[1]
 
-    def require_periodic(self, purpose: str) -> None:
-        """Raise ValueError if the surface is a free square; the message names the computation `purpose`."""
-        if self.free:
-            raise ValueError(f"boundary: {FREE!r}; {purpose} needs a surface of boundary {PERIODIC!r}")
-
     def by_wave_vector(self, function) -> list:
         """Call `function(k2, count, power)` for blocks of all wave vectors, and return the list of the results.
 
@@ -333,16 +331,15 @@ class Surface:
         vars(scaled)["spectral_moments"] = tuple(moment * factor**2 for moment in self.spectral_moments)
         return scaled
 
-    def scaled_to_rms_height(self, rms_height: float) -> Surface:
-        """Return the surface with heights scaled to the rms height `rms_height`, m; a smooth surface is not scaled."""
-        return self if self.smooth else self.scaled_to_rms_slope(self.rms_slope * rms_height / self.rms_height)
-
     def refined(self, factor: int) -> Surface:
         """Interpolate the heights by Fourier series on a grid `factor` times as fine; old nodes keep their heights.
 
         Raises ValueError if the factor is not an integer of at least 1, or the surface is a free square.
         """
-        self.require_periodic("a trigonometric interpolant")
+        if self.free:
+            raise ValueError(
+                f"boundary: {FREE!r}; a trigonometric interpolant needs a surface of boundary {PERIODIC!r}"
+            )
         if IntegerRange(1).validate("factor", factor) == 1:
             return self
         # Slow to import, and rarely needed.

@@ -311,7 +311,7 @@ def merge_spectra(
     ValueError
         If nothing is given, or if no wave is trusted.
     """
-    members = [(*_of_scan(surface), _trusted_range(surface, tip_radius)) for surface in scans]
+    members = [(*radial_power_spectrum(surface)[:2], _trusted_range(surface, tip_radius)) for surface in scans]
     scan_count = len(members)
     members += _of_profiles([_profile(each) for each in profiles])
     if not members:
@@ -346,11 +346,6 @@ def _profile(pair):
     except (TypeError, ValueError):
         raise ValueError("profiles: expected a list of pairs (x, z) of positions and heights, m") from None
     return np.atleast_1d(x), np.atleast_1d(z)
-
-
-def _of_scan(surface):
-    q, power, _ = radial_power_spectrum(surface)
-    return q, power
 
 
 def _trusted_range(surface: Surface, tip_radius: float | None) -> tuple[float, float, str]:

@@ -53,11 +53,6 @@ class Defects:
         return f"{format_count(self.outliers, 'outlier')}, {size}" if self.outliers else ""
 
 
-def robust_deviation(values: np.ndarray) -> float:
-    """Return the robust standard deviation of the known values."""
-    return _NORMAL * float(np.nanmedian(np.abs(values - np.nanmedian(values))))
-
-
 def find_outliers(heights: np.ndarray) -> tuple[np.ndarray, float]:
     """Find the outliers of a scan: points, and patches with a steep edge, far from the heights around them.
 
@@ -109,7 +104,9 @@ def _deviation(level, medians, k):
 
 def _is_unusual(deviation, known):
     """Return the mask of the deviations that exceed the usual deviation of the known points."""
-    return deviation > _OF_NEIGHBOURS * robust_deviation(deviation[known])
+    values = deviation[known]
+    usual = _NORMAL * float(np.nanmedian(np.abs(values - np.nanmedian(values))))
+    return deviation > _OF_NEIGHBOURS * usual
 
 
 def _with_steep_edge(found, level, high):
