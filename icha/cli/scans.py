@@ -70,6 +70,8 @@ def describe_scan(name: str, scan, *, to_scale: bool = True, models: Iterable[Mo
 
 def _reading(scan, to_scale: bool) -> Iterator[str]:
     """Yield lines on the format of the file, on points without a height, and on opposite edges that do not fit."""
+    from icha.surfaces.surface import edges_fit
+
     share = formatting.share(scan.filled, scan.points)
     filled = f"heights of {format_count(scan.filled, 'point')} interpolated ({share} of the square)"
     array = f", `data: {printable(scan.square.data)}`, one of several" if scan.square.data else ""
@@ -82,7 +84,7 @@ def _reading(scan, to_scale: bool) -> Iterator[str]:
             f"warning: more than {100 * MOST_FILLED:.0f} % of the heights are interpolated and too smooth; measure "
             "again, or `crop` an area with fewer missing points"
         )
-    if not scan.edges_fit:
+    if not scan.surface.free and not edges_fit(scan.surface.heights):
         yield (
             "warning: `boundary: periodic`, but opposite edges differ by much more than neighbouring nodes, so there "
             "is a step at the edges; use `boundary: window`, `mirror` or `free`"
@@ -91,6 +93,8 @@ def _reading(scan, to_scale: bool) -> Iterator[str]:
 
 def _defects(scan, to_scale: bool) -> Iterator[str]:
     """Yield lines on outliers, offsets of scan lines and curvature: what was removed, or the keys that remove them."""
+    from icha.surfaces.moments import slope_anisotropy
+
     defects, settings = scan.defects, scan.settings
     if found := defects.description_of_outliers:
         removed = found.replace(",", " replaced,", 1)
@@ -112,9 +116,9 @@ def _defects(scan, to_scale: bool) -> Iterator[str]:
         yield f"{taken}{' and was removed' if settings.detrend == 'curvature' else advice}"
     if left := " and ".join(f"`{key}`" for key in keys_for_defects(scan)):
         yield f"write {left}; then `icha describe` judges the surface without the defects"
-    elif scan.anisotropy > ANISOTROPIC:
+    elif (anisotropy := slope_anisotropy(scan.surface)) > ANISOTROPIC:
         yield (
-            f"anisotropic: the largest rms slope of all directions is {scan.anisotropy:.2g} times the smallest; the "
+            f"anisotropic: the largest rms slope of all directions is {anisotropy:.2g} times the smallest; the "
             "asperity model has been validated for isotropic surfaces only"
         )
 
@@ -128,20 +132,26 @@ def keys_for_defects(scan) -> list[str]:
 
 def _resolution(scan, to_scale: bool, models: list[Model]) -> Iterator[str]:
     """Yield lines on the resolution of summits and waves, and on models that are not applicable."""
-    from icha.surfaces.resolution import RECOMMENDED_CELLS
+    import numpy as np
 
-    used = scan.surface
+    from icha.surfaces.resolution import RECOMMENDED_CELLS
+    from icha.surfaces.summits import SummitCoverage
+
+    used, unsupported = scan.surface, len(scan.asperities.unsupported_height)
+    summits = len(scan.asperities) + unsupported
     scale = f" {formatting.length(used.spacing)} apart, rms slope {used.rms_slope:.3g}" if to_scale else ""
     yield (
-        f"{used.grid} x {used.grid} nodes{scale}, {format_count(scan.summits, 'summit')}, about {scan.resolution}; "
+        f"{used.grid} x {used.grid} nodes{scale}, {format_count(summits, 'summit')}, about {scan.resolution}; "
         f"recommended: at least {RECOMMENDED_CELLS}"
     )
-    if unsupported := len(scan.asperities.unsupported_height):
+    if unsupported:
         yield (
             f"the asperity model excludes {unsupported} of these summits, because the nodes around them form steps, "
             "spikes, pits or plateaus instead of smooth summits"
         )
-    reasons = scan.reasons_against_asperities
+    # At mean separations of 3 to 1 rms heights.
+    heights = np.linspace(3, 1, 5) * used.rms_height
+    reasons = SummitCoverage.of(used, scan.asperities).reasons_against(heights)
     if reasons and (not models or any(model.by_summits for model in models)):
         other_model = ", or `models: [boundary_elements]`" if scan.resolution.representable else ""
         yield (

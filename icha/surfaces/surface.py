@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.fft
 
-from icha.support.formatting import choose_unit, format_quantity, html_table
+from icha.support.formatting import format_quantity, html_table
 from icha.support.parallel import blocks, on_cores
 from icha.support.rules import LENGTH, SLOPE, FloatRange, IntegerRange
 from icha.support.usual import IchaWarning, unusual_arguments
@@ -128,24 +128,6 @@ class Surface:
             warnings.warn(MISFIT_OF_EDGES, IchaWarning, stacklevel=3)
         for text in unusual_arguments({"period": self.period} | ({} if self.smooth else {"rms_slope": self.rms_slope})):
             warnings.warn(text, IchaWarning, stacklevel=3)
-
-    def plot(self, axes=None):
-        """Draw a map of the heights; return the axes of matplotlib. `axes` None stands for new axes."""
-        import matplotlib.pyplot as plt
-
-        axes = plt.subplots()[1] if axes is None else axes
-        (length, unit), (height, height_unit) = (choose_unit(each, "m") for each in (self.period, self._range))
-        side = self.period * length
-        heights = (self.profile if self.shape else self.heights) * height
-        image = axes.imshow(heights, origin="lower", extent=(0, side, 0, side), cmap="cividis")
-        axes.figure.colorbar(image, ax=axes, label=f"height ({height_unit})")
-        axes.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})")
-        return axes
-
-    @property
-    def _range(self) -> float:
-        """Range of the heights, with the shape, m."""
-        return float(np.ptp(self.profile[np.isfinite(self.profile)]) if self.shape else np.ptp(self.heights))
 
     def _repr_html_(self) -> str:
         """Return a table for notebooks."""

@@ -40,12 +40,11 @@ def test_contact_is_drawn_for_both_models(model):
     assert len(shown) == (run.sizes["spot"] if model == "asperities" else 32)
 
 
-def test_surfaces_can_be_drawn_and_looked_at():
+def test_surfaces_materials_and_paths_show_their_values():
     surface = small.surface()
     assert "<caption>Surface</caption>" in surface._repr_html_() and "32 × 32" in surface._repr_html_()
-    assert surface.plot().images[0].get_array().shape == (32, 32)
     lens = icha.Surface(surface.heights, surface.period, "free", icha.Sphere(1e-2))
-    assert "shape" in lens._repr_html_() and lens.plot().images
+    assert "shape" in lens._repr_html_()
     assert "contact modulus" in small.MATERIALS["soft"]._repr_html_()
     assert "thickness" in icha.Material(1e6, 0.0, thickness=1e-4)._repr_html_()
     assert "pressures" in icha.Path(pressures=[1e3], unload=True)._repr_html_()

@@ -12,10 +12,10 @@ import scipy.fft
 from icha.surfaces.measured.defects import Defects
 from icha.surfaces.measured.settings import Preparation
 from icha.surfaces.measured.topography import LEAST_PIXELS, PreparedTopography, defects_of, prepared_topography
-from icha.surfaces.moments import radial_power_spectrum, slope_anisotropy
+from icha.surfaces.moments import radial_power_spectrum
 from icha.surfaces.resolution import LEAST_CELLS, RECOMMENDED_CELLS, Resolution, resolution_of
-from icha.surfaces.summits import Asperities, SummitCoverage, locate_summits
-from icha.surfaces.surface import FREE, PERIODIC, Surface, edges_fit
+from icha.surfaces.summits import Asperities, locate_summits
+from icha.surfaces.surface import FREE, PERIODIC, Surface
 
 # Conditions for a noise floor: it falls less steeply than q^_FLOOR_FALLS, and spans a factor of _FLOOR_SPANS in wave
 # number. A self-affine spectrum falls at least as steeply as q^-2; the spectrum of uncorrelated noise is flat.
@@ -62,11 +62,6 @@ class ScanResolution(PreparedTopography):
         """Outliers, offsets of scan lines and curvature of the scan, before they are removed."""
         return defects_of(self.square)
 
-    @cached_property
-    def anisotropy(self) -> float:
-        """Ratio of the largest to the smallest rms slope along all directions, of the prepared surface."""
-        return slope_anisotropy(self.surface)
-
     @property
     def noise_share_after_filter(self) -> float:
         """Fraction of the mean square slope of the filtered surface that is noise; 0 without a noise floor."""
@@ -77,26 +72,10 @@ class ScanResolution(PreparedTopography):
         floor = np.minimum(power, (self.noise.rms * self.measured.spacing / (2 * math.pi)) ** 2)
         return float(np.sum(slopes * floor) / np.sum(slopes * power))
 
-    @property
-    def edges_fit(self) -> bool:
-        """True if the prepared surface is a free square, or a periodic surface without a step between cells."""
-        return self.surface.free or edges_fit(self.surface.heights)
-
     @cached_property
     def asperities(self) -> Asperities:
         """Summits of the prepared surface, and its unsupported maxima; see `Asperities`."""
         return locate_summits(self.surface)
-
-    @property
-    def summits(self) -> int:
-        """Number of summits of the prepared surface, including unsupported summits."""
-        return len(self.asperities) + len(self.asperities.unsupported_height)
-
-    @property
-    def reasons_against_asperities(self) -> list[str]:
-        """Reasons why asperities do not represent the surface at mean separations of 3 to 1 rms heights."""
-        heights = np.linspace(3, 1, 5) * self.surface.rms_height
-        return SummitCoverage.of(self.surface, self.asperities).reasons_against(heights)
 
     @cached_property
     def resolution(self) -> Resolution:

@@ -102,13 +102,13 @@ def format_of_text(file: SourceFile) -> str:
 
 def read_matrix(file: SourceFile, settings: Preparation) -> FileContent:
     """Read a text file with a row of heights in every line; units, size and missing heights come from its heading."""
-    heights, heading = file.values, _Heading(file.table_layout)
+    (heights, _, ends_with_delimiters), heading = file.table, _Heading(file.table_layout)
     if "".join(heading.lines[:1]).startswith("Zygo "):
         raise UnfitTopography("is a Zygo file without points x y z; expected another export, such as XYZ")
     file.refuse_blocks()
     if not (heading.agrees_with(heights.shape) or heading.is_image):
         refuse_coordinates(heights)
-        if file.ends_with_delimiters and len(heights) != len(heights.T):
+        if ends_with_delimiters and len(heights) != len(heights.T):
             raise UnfitTopography(
                 "has a delimiter at the end of every line; the last column may be missing heights, or no column. "
                 "Remove these delimiters, or write nan for missing heights"
@@ -121,7 +121,8 @@ def read_matrix(file: SourceFile, settings: Preparation) -> FileContent:
 def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
     """Read a text file with a point x y z in every line; points may be in any order or missing."""
     layout = file.table_layout
-    titles, count = _find_titles(layout), file.values.shape[1]
+    table, titles = file.table[0], _find_titles(layout)
+    count = table.shape[1]
     titled, units = _read_titles(titles)
     columns = list(settings.columns or titled or (1, 2, 3))
     if settings.columns is None and not titled and (count != 3 or titles):
@@ -131,7 +132,7 @@ def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
         )
     if max(columns) > count:
         raise UnfitTopography(f"is larger than the number of columns; expected 1 to {count}", "columns")
-    points = file.values[:, [column - 1 for column in columns]]
+    points = table[:, [column - 1 for column in columns]]
     placed = np.isfinite(points[:, :2]).all(axis=1)
     if np.isfinite(points[~placed, 2]).any():
         raise UnfitTopography("has a height without coordinates; expected x, y and z in every line")

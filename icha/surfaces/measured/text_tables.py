@@ -92,22 +92,13 @@ class SourceFile:
             )
         return self.layout
 
-    @property
-    def values(self) -> np.ndarray:
-        """Numbers in the file, array of shape (rows, columns); nan where a number is missing.
+    @cached_property
+    def table(self) -> tuple[np.ndarray, np.ndarray, bool]:
+        """Numbers in the file, the line number (from 1) of each row, and whether all lines end with a delimiter.
 
+        Numbers have the shape (rows, columns), without an empty column after the delimiters; missing numbers are nan.
         Raises UnfitTopography if the file has no numbers, a field that is not a number, or rows of different lengths.
         """
-        return self._table[0]
-
-    @property
-    def ends_with_delimiters(self) -> bool:
-        """Whether every line ends with a delimiter; `values` does not contain an empty column after it."""
-        return self._table[2]
-
-    @cached_property
-    def _table(self):
-        """Numbers in the file, the line number (from 1) of each row, and whether all lines end with a delimiter."""
         layout = self.table_layout
         values, lines, ends = [], [], layout.delimiter != " "
         rows = self._rows()
@@ -145,7 +136,7 @@ class SourceFile:
 
         A file with empty lines or remarks between all rows is accepted.
         """
-        _, lines, _ = self._table
+        _, lines, _ = self.table
         begins = np.flatnonzero(np.diff(lines) > 1) + 1
         if not self.table_layout.wrapped and len(begins) and min(np.diff([0, *begins, len(lines)])) > 1:
             raise UnfitTopography(
