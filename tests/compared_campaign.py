@@ -96,11 +96,3 @@ def tree_at_finite_range():
 def errors():
     """The error against `patches_at_finite_range`."""
     return model_error(tree_at_finite_range(), patches_at_finite_range())
-
-
-def errors_at_own_slopes():
-    """The errors of two surfaces, each at a slope of its own, as measured ones are."""
-    one = errors()["one"].to_dataset()
-    other = one.assign_coords(surface=["other"], rms_slope=[0.5])
-    both = xr.merge([one, other], join="outer", compat="no_conflicts")
-    return xr.DataTree.from_dict({"/one": both.assign_attrs(one.attrs)})

@@ -34,7 +34,6 @@ studies:
       - area_fraction: 0.02
 """
 
-GOOD_RUN = "one/rough/seed1/slope0.2/soft"
 ORCID = "0000-0002-1825-0097"
 CARBERRY = {"family_names": "Carberry", "given_names": "Josiah"}
 

@@ -1,7 +1,5 @@
 """Figures of small and unusual campaigns: what they show, their messages, and their bytes."""
 
-import itertools
-
 import compared_campaign as compared
 import cyclic_campaign as cyclic
 import matplotlib as mpl
@@ -15,20 +13,14 @@ from matplotlib.colors import to_hex, to_rgb
 import icha
 from icha.analysis.model_error import jaccard
 from icha.datasets.campaign_file import campaign_tree
-from icha.datasets.files import write_dataset
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of
-from icha.datasets.results import FIGURE_ENDINGS
-from icha.figures import against_load, against_parameter, at_one_load, contact_maps, ensembles, errors, one_asperity
+from icha.figures import against_load, against_parameter, at_one_load, contact_maps, errors, one_asperity
 from icha.figures.drawn import caption_of
 from icha.figures.looks import material_colours
 from icha.figures.maps import average_blocks, wrap_circles
-from icha.figures.registry import draw_figure
 from icha.figures.select import NothingToDraw, branches, path_steps, select_runs
 from icha.figures.style import (
-    choose_unit,
-    format_number,
-    format_quantity,
     save,
 )
 from icha.references.persson import persson_pressure_density
@@ -144,7 +136,7 @@ def test_fig5_draws_measurements_over_the_curves(tmp_path):
     (tmp_path / "other.csv").write_text("p, a\n1e-3, 3e-3\n1e-2, 3e-2\n2e-2, 5e-2\n")
     measured = {"columns": {"p": 1e3, "a": 0.01}, "contact_modulus": 5e6, "material": "soft", "rms_slope": 0.2}
     without_slope = {"columns": {"p": 1.0, "a": 1.0}, "contact_modulus": None, "material": None, "rms_slope": None}
-    left, right = against_load.multi_slope(
+    figure = against_load.multi_slope(
         small.tree(),
         [tmp_path / "one.csv", tmp_path / "other.csv"],
         study="slopes",
@@ -152,7 +144,9 @@ def test_fig5_draws_measurements_over_the_curves(tmp_path):
             measured | {"label": "Someone, 2020", "citation": "Someone"},
             without_slope | {"label": "Another", "citation": "Another"},
         ],
-    ).axes
+    )
+    assert "measurements: Someone, 2020 (Someone); Another (Another)." in caption_of(figure)
+    left, right = figure.axes
     found = {line.get_label(): line for line in right.get_lines() if not line.get_label().startswith("_")}
     assert set(found) == {"Someone, 2020", "Another"}
     np.testing.assert_allclose(found["Someone, 2020"].get_xydata(), [(1e-3, 2), (1e-2, 2), (2e-2, 2)])
@@ -160,27 +154,6 @@ def test_fig5_draws_measurements_over_the_curves(tmp_path):
     shifted = [line for line in left.get_lines() if len(line.get_xdata()) == 3]
     assert len(shifted) == 1
     np.testing.assert_allclose(shifted[0].get_xdata(), [2e-4, 2e-3, 4e-3])
-
-
-def test_fig5_contains_measurements_far_from_the_curves(tmp_path):
-    (tmp_path / "far.csv").write_text("p, a\n1e-3, 0.02\n1e-2, 0.3\n")
-    far = {"columns": {"p": 1.0, "a": 1.0}, "contact_modulus": None, "material": None, "rms_slope": None}
-    tables, measurements = [tmp_path / "far.csv"], [far | {"label": "far", "citation": "Someone"}]
-    _, right = against_load.multi_slope(small.tree(), tables, study="slopes", measurements=measurements).axes
-    low, high = right.get_ylim()
-    assert low < 20 and high > 30
-
-
-def test_the_caption_names_the_measurements_of_fig5(tmp_path):
-    (tmp_path / "one.csv").write_text("p, a\n1e-3, 0.02\n")
-    write_dataset(small.tree(), tmp_path / "small.nc")
-    known = {"columns": {"p": 1.0, "a": 1.0}, "contact_modulus": None, "material": None, "rms_slope": None}
-    measurements = [known | {"label": "rubber", "citation": "A. Author (2000)"}]
-    inputs = {"campaign": str(tmp_path / "small.nc"), "tables": [str(tmp_path / "one.csv")]}
-    files = [tmp_path / f"five.{ending}" for ending in FIGURE_ENDINGS]
-    arguments = {"study": "slopes", "measurements": measurements}
-    draw_figure("fig5_multi_slope", *files, inputs=inputs, arguments=arguments, studies=["slopes"])
-    assert "Lines without markers are measurements: rubber (A. Author (2000))." in files[2].read_text()
 
 
 def test_values_that_the_campaign_lacks_are_named_with_those_it_has():
@@ -249,15 +222,6 @@ def test_fig9_joins_runs_that_differ_in_range_and_shows_the_adhesionless_one(mon
     tree = campaign_tree([(RunLabels("tabor", "asperities", "rough", 1, 1.0, "bare"), runs["bare"])])
     with pytest.raises(ValueError, match="study tabor: no run with adhesion is complete"):
         against_parameter.tabor(tree, study="tabor")
-
-
-def test_fig2_compares_curves_whose_first_area_is_reached_in_tension():
-    runs = [*compared.runs().items(), *compared.patches()]
-    sign = xr.where(np.arange(runs[0][1].sizes["step"]) == 0, -1.0, 1.0)
-    tensile = {name: runs[0][1][name] * sign for name in ("reduced_pressure", "nominal_pressure")}
-    runs[0] = runs[0][0], runs[0][1].assign(tensile)
-    figure = against_load.area_and_gap(campaign_tree(runs), study="one")
-    assert len(figure.axes) == 4 and figure.axes[2].get_lines()
 
 
 def test_fig2_draws_theories_of_separate_summits_where_there_are_any():
@@ -386,15 +350,6 @@ def test_errors_of_runs_that_all_failed_are_nothing_to_draw():
         errors.distribution_error(compared.tree(), xr.DataTree.from_dict(empty), study="one")
 
 
-def test_surfaces_of_different_slopes_are_compared_at_their_own_alone():
-    error = compared.errors_at_own_slopes()
-    assert error["one"].sizes["surface"] == error["one"].sizes["rms_slope"] == 2
-    figure = errors.model_error(compared.tree(), error, study="one")
-    assert len(figure.axes[0].containers) == 4
-    names = legend(figure)
-    assert sum("other" in name for name in names) == sum("rough" in name for name in names) == 2
-
-
 def test_only_complete_runs_are_drawn():
     runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"]
     ended = [(labels, run.assign_attrs(incomplete="no equilibrium at the third stop")) for labels, run in runs]
@@ -402,12 +357,6 @@ def test_only_complete_runs_are_drawn():
     assert {labels for labels, _ in select_runs(tree, "slopes")} == {labels for labels, _ in runs[1:]}
     with pytest.raises(NothingToDraw, match="study slopes: no run is complete"):
         against_load.multi_slope(campaign_tree(ended), study="slopes")
-
-
-def test_formatted_numbers_and_units():
-    assert choose_unit(100e-6, "m")[1] == "µm" and choose_unit(0.1, "m")[1] == "mm"
-    assert choose_unit(1e-3, "m") == (pytest.approx(1e3), "mm") and format_quantity(2.071e-9, "m") == "2.071 nm"
-    assert [format_number(each) for each in (0.01, 1e-5, 3.2e-5)] == ["0.01", "$10^{-5}$", r"$3.2\times10^{-5}$"]
 
 
 # --- ensembles --------------------------------------------------------------------------------------------------
@@ -484,19 +433,6 @@ def test_fig2_compares_models_at_equal_loads_whatever_their_stops():
     np.testing.assert_allclose(line.get_xydata(), [(1e-2, 100 * (area[1] / true_area - 1))], rtol=1e-6)
 
 
-def test_patches_of_boundary_elements_stand_beside_those_of_asperities():
-    tree = compared.tree_of_both()
-    figure = at_one_load.patch_sizes(tree, study="one", target=3e-3)
-    for axes in figure.axes:
-        dashed = [line for line in axes.get_lines() if line.is_dashed()]
-        assert {line.get_color() for line in dashed} == set(material_colours(tree).values())
-        solid = [line.get_xydata() for line in axes.get_lines() if not line.is_dashed()]
-        for line in dashed:  # made of the same states
-            assert any(np.array_equal(line.get_xydata(), own) for own in solid)
-    assert {"asperities", "boundary elements"} <= set(legend(figure))
-    assert "boundary elements" not in legend(at_one_load.patch_sizes(compared.tree(), study="one"))
-
-
 @pytest.mark.parametrize("module", [against_load.area_and_gap, at_one_load.patch_sizes])
 def test_figures_of_boundary_elements_alone_call_them_so(module):
     figure = module(campaign_tree(compared.patches()), study="one")
@@ -526,29 +462,6 @@ def test_a_material_has_one_colour_and_a_model_one_marker_in_all_figures_of_a_ca
         assert to_hex(np.atleast_1d(line.get_color())[0]) == to_hex(colours["soft"])
         drawn = [line for line in figure.axes[0].get_lines() if line.get_color() == colours["soft"]]
         assert drawn and {line.get_marker() for line in drawn} <= {"o", "+", "1", ".", "_", "None", None}
-
-
-def many(surfaces=9, materials=1):
-    """A study of many surfaces or materials, of the same run, named as variations of a parameter."""
-    names = [f"rough-hurst{0.2 + 0.02 * k:.2f}" for k in range(surfaces)]
-    kinds = ["soft"] if materials == 1 else [f"soft-surface_energy{k}mJ" for k in range(materials)]
-    runs = []
-    for name, (k, kind) in itertools.product(names, enumerate(kinds)):
-        energy = small.run()["surface_energy"] * (1 + 0.1 * k)
-        run = small.run().assign(surface_energy=energy, receding_energy=energy)
-        runs.append((RunLabels("many", "asperities", name, 1, 1.0, kind), run))
-    return campaign_tree(runs)
-
-
-def test_differences_end_at_the_largest_load_that_both_models_reach():
-    runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"][:1]
-    (labels, run), smaller = runs[0], 0.9
-    truth = compared.own_patches(run)
-    truth = truth.assign(reduced_pressure=smaller * truth["reduced_pressure"])
-    runs.append((labels._replace(model="boundary_elements"), truth))
-    panels = against_load.area_and_gap(campaign_tree(runs), study="slopes").axes
-    drawn = [line.get_xdata() for line in panels[2].get_lines() if line.get_marker() == "o"]
-    assert max(map(max, drawn)) == pytest.approx(smaller * max(small.PRESSURES))
 
 
 def test_fig4_does_not_show_another_run_where_its_own_failed(surface):
@@ -603,26 +516,6 @@ def test_fig2_compares_the_estimate_from_bare_runs_with_adhesive_boundary_elemen
     assert len(drawn) > 6 and np.abs(drawn).max() < 8
 
 
-def test_single_seeds_are_drawn_only_beside_few_curves(monkeypatch):
-    def thin(fig):
-        return [line for line in fig.axes[0].get_lines() if line.get_linewidth() == 0.5 and len(line.get_xdata())]
-
-    tree = compared.tree()
-    fig = against_load.area_and_gap(tree, study="one")
-    assert thin(fig) and "single seeds" in fig.legends[0].get_texts()[-1].get_text()
-    monkeypatch.setattr(ensembles, "MOST_SCATTERED", 1)
-    fig = against_load.area_and_gap(tree, study="one")
-    names = [text.get_text() for text in fig.legends[0].get_texts()]
-    assert not thin(fig) and "means over the seeds, n = 3" in names
-
-
-def test_captions_name_the_units_and_the_models_that_are_drawn():
-    alone = campaign_tree(compared.patches())
-    caption = caption_of_fig2("one", campaign=alone, units="physical")
-    assert "mean gap (b), against the nominal pressure" in caption and "Crosses are boundary elements" in caption
-    assert not any(words in caption for words in ("reduced", "asperity model", "GFMD"))
-
-
 def test_fig2_in_physical_units_has_pressures_and_gaps_with_units():
     references = reference_dataset(small.SPECTRUM, spectral_moments(small.surface()), {})
     left, right = against_load.area_and_gap(small.tree(), references, study="single", units="physical").axes
@@ -643,13 +536,3 @@ def at_common(runs):
     """Nominal pressures and mean gaps of runs at the targets that they share."""
     stops = [path_steps(run) for run in runs]
     return stops[0]["nominal_pressure"].values, np.array([each["mean_gap"].values for each in stops])
-
-
-def test_fig7_has_no_legend_of_a_material_without_points():
-    """The stiffness of a material is negative at all steps."""
-    runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"]
-    changed = [
-        (k, r.assign(contact_stiffness=-r["contact_stiffness"]) if k.material == "hertz" else r) for k, r in runs
-    ]
-    names = legend(against_load.stiffness(campaign_tree(changed), study="slopes"))
-    assert any("mJ/m²" in name for name in names) and not any("gamma$ = 0" in name for name in names)

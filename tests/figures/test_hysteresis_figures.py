@@ -259,17 +259,6 @@ def test_fig15_fits_nothing_through_two_loads_or_other_seeds(tree):
     assert np.count_nonzero(np.isfinite(figure.axes[0].containers[0][0].get_xdata())) == 3
 
 
-def test_fig15_has_bar_and_legend_entry_for_a_series_that_only_boundary_elements_have():
-    runs = separate.study("one", materials=("sticky",), slopes=(0.5,))
-    others = separate.study("two", materials=("sticky",), slopes=(0.25,))
-    tree = separate.tree(runs, [(labels._replace(model=REFERENCE_MODEL), run) for labels, run in others])
-    figure = against_parameter.loss(tree, studies=["one", "two"])
-    markers = [line for line in figure.axes[1].get_lines() if len(line.get_xdata()) == 1]
-    assert [line.get_marker() for line in markers] == ["o", figure.axes[0].containers[1][0].get_marker()]
-    assert {float(bar.get_x() + bar.get_width() / 2) for bar in figure.axes[1].patches} == {0.0, 1.0}
-    assert all(any(f"= {slope}" in name for name in legend(figure)) for slope in ("0.5", "0.25"))
-
-
 def points(*runs):
     """A line of points, from x and y of every seed."""
     return Points(
@@ -285,11 +274,6 @@ def test_points_of_a_line_are_means_over_the_seeds_that_all_have():
     assert line.means.tolist() == [[1, 3], [4, 20]]
     apart = points({1: (2.0, 10.0)}, {2: (3.0, 8.0)})
     assert not apart.same_seeds and apart.means[1].tolist() == [10, 8]
-
-
-def test_fig15_needs_adhesion():
-    with pytest.raises(ValueError, match="studies one: no run with adhesion"):
-        against_parameter.loss(one("hertz"), studies=["one"])
 
 
 def test_fig15_parts_are_of_either_sign_and_make_up_the_whole(tree):

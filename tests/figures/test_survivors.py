@@ -17,7 +17,6 @@ from icha.figures.style import new_figure
 
 SEEDS = range(1, 6)
 REASON = "asperity model not applicable: 40 % of the load is on summits that no node supports"
-LOADING = (against_load.area_and_gap, against_load.multi_slope)
 
 
 def campaign(failed=None, checks=None, pale=(), lacking=(), run=small.run):
@@ -48,7 +47,7 @@ def crossed(axes):
     return [line for line in axes.get_lines() if line.get_label() == FEWER_SEEDS]
 
 
-@pytest.mark.parametrize("module", [*LOADING, against_parameter.loss])
+@pytest.mark.parametrize("module", [against_load.area_and_gap, against_parameter.loss])
 def test_means_over_fewer_seeds_are_crossed_and_runs_not_applicable_are_pale(module):
     run = cyclic.run if module is against_parameter.loss else small.run
     figure = draw(module, campaign(lacking=(2,), checks=(4,), pale=(5,), run=run))

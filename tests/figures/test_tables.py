@@ -6,7 +6,6 @@ import compared_campaign as compared
 import numpy as np
 import pandas as pd
 import small_campaign as small
-from drawn import legend
 from xarray import DataTree
 
 import icha
@@ -16,7 +15,7 @@ from icha.datasets.table import as_csv
 from icha.figures import against_load, at_one_load, contact_maps, errors
 from icha.figures.drawn import table_of
 from icha.figures.registry import draw_figure
-from icha.figures.select import path_steps, select_runs
+from icha.figures.select import path_steps
 from icha.references.theories import reference_dataset
 from icha.surfaces.moments import spectral_moments
 
@@ -62,18 +61,6 @@ def test_boundary_elements_are_named_as_such():
         ("asperities", "asperities"),
         ("boundary elements", "boundary_elements"),
     }
-
-
-def test_boundary_elements_beside_curves_have_the_range_of_few_seeds():
-    tree = compared.tree_of_both()
-    figure = against_load.area_and_gap(tree, study="one")
-    data = table(figure)
-    shown = data[(data.panel == "b") & (data.model == "boundary_elements") & (data.material == "soft")]
-    runs = [run for labels, run in select_runs(tree, "one", model="boundary_elements") if labels.material == "soft"]
-    each = [path_steps(run)["reduced_separation"].values for run in runs]
-    assert len(each) == 3
-    np.testing.assert_allclose([shown.low, shown.high], [np.min(each, axis=0), np.max(each, axis=0)], rtol=1e-6)
-    assert "mean and range, n = 3" in legend(figure)
 
 
 def test_theories_of_several_materials_can_be_told_apart():
