@@ -25,12 +25,14 @@ REPOSITORY = Path(__file__).parents[1]
 PARTS = ("Snakefile", "icha", "workflow", "config", "profiles", ".gitignore", "Makefile", "LICENSE")
 PARTS += ("pyproject.toml", "uv.lock", "README.md")
 SMOKE = "config/campaigns/smoke.yaml"
-# Figures of the campaign `smoke` in tests, one for each kind of input, and replacements that make its runs smaller.
+# Figures of the campaign `smoke` in tests, one for each kind of input, studies without others of their kind, and
+# replacements that make its runs smaller.
 FIGURES = ("fig1_jkr", "fig2_area_and_gap", "fig10_model_error", "fig13_loops")
+LEFT_OUT = ("multi_slope_truth", "pull_far")
 SMALLER = {
-    "[1.0e-2, 3.16e-2]\n    unload": "[3.16e-3]\n    unload",
     "[3.16e-3, 1.0e-2]\n    turning_points": "[1.0e-3, 3.16e-3]\n    turning_points",
     "pressure: 5.0e-3\n      - reduced_pressure: 1.0e-2": "pressure: 1.5e-3\n      - reduced_pressure: 3.16e-3",
+    "study: pull_far": "study: pull",
 }
 # A figure of the user's own, whose script lies beside the configuration.
 SPOTS = """
@@ -92,13 +94,14 @@ def snakemake(project, *arguments, configuration=SMOKE, **variables):
 
 
 def smaller_smoke():
-    """Return the text of the campaign `smoke` with smaller runs and fewer figures."""
+    """Return the text of the campaign `smoke` with smaller runs, fewer studies and fewer figures."""
     text = (REPOSITORY / SMOKE).read_text(encoding="utf-8")
     for large, small in SMALLER.items():
         assert large in text
         text = text.replace(large, small)
-    figures = "|".join(FIGURES)
-    text = re.sub(rf"^  (?!({figures}):)fig\w+:\n(    .*\n)+", "", text, flags=re.MULTILINE)
+    figures, studies = "|".join(FIGURES), "|".join(LEFT_OUT)
+    for entry in (rf"(?!({figures}):)fig\w+", rf"({studies})"):
+        text = re.sub(rf"^  {entry}:\n(    .*\n)+", "", text, flags=re.MULTILINE)
     return text.replace("figures:\n", "figures:\n  spots: {study: challenge, script: spots.py}\n")
 
 
@@ -144,17 +147,3 @@ def wait_for(condition, seconds=120):
                 return
         time.sleep(0.02)
     raise AssertionError(f"the condition was not met in {seconds} s")
-
-
-def is_alive(process):
-    """Return whether a process is running; a zombie is not."""
-    try:
-        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
-
-
-@pytest.fixture
-def project(smoke, tmp_path):
-    """Copy of `smoke` that a test may change."""
-    return shutil.copytree(smoke, tmp_path / "project")

@@ -243,7 +243,7 @@ def test_a_scan_is_analysed_before_anything_is_computed(project):
     assert "few grid cells" not in output("describe", "mine")
 
 
-@pytest.mark.parametrize(("licence", "accepted"), [("CC-BY", False), ("cc0-1.0", False), ("CC0-1.0", True)])
+@pytest.mark.parametrize(("licence", "accepted"), [("CC-BY", False), ("CC0-1.0", True)])
 def test_a_licence_that_no_deposit_can_have_is_reported_before_anything_is_computed(licence, accepted, project):
     Path("tiny.yaml").write_text(TINY.replace("CC0-1.0", licence))
     described = printed("describe", "tiny.yaml")
@@ -297,6 +297,29 @@ def test_the_states_of_runs_are_distinguished(tiny):
     assert "4 runs, 2 to do" in described and f"failed: {failed}: the path ends early" in described
     for reason in ("with other settings", "by another version of the program"):
         assert f"outdated: 1 file, because it was computed {reason}: will be computed again" in described
+
+
+def test_runs_that_failed_or_ended_early_are_listed_with_their_reasons(tiny, monkeypatch):
+    campaign, results = tiny
+    first, second, third, _ = campaign_files(campaign).runs
+
+    def compute(command, folder, log, progress, name):
+        write_results(campaign, results, [first, second], beyond_model="the path ends at 0.2 of the area")
+        write_results(campaign, results, [third], incomplete="no equilibrium")
+        (results / "logs/verdict.log").write_text("Error: 1 of 9 checks failed\n")
+        progress.count()
+        return 1, False
+
+    monkeypatch.setattr(sys.modules["icha.cli.run"], "run_process", compute)
+    said = output("run", "tiny.yaml", "runs", status=1)
+    ended, failed = (f"results/tiny/logs/{name}_runs.txt" for name in ("ended", "failed"))
+    assert f"2 runs ended before the last target, as physics decides; all reasons: {ended}" in said
+    assert f"\n    {first[5:-3]}: the path ends at 0.2 of the area (1 seed)\n" in said
+    assert f"1 run failed; all reasons: {failed}\n    {third[5:-3]}: no equilibrium (1 seed)\n" in said
+    assert "1 job failed:\n    1 of 9 checks failed\n        log: results/tiny/logs/verdict.log\n" in said
+    assert Path(ended).read_text().splitlines() == [
+        f"{run[5:-3]}: the path ends at 0.2 of the area" for run in (first, second)
+    ]
 
 
 def test_a_dataset_with_runs_that_are_no_longer_in_the_campaign_is_computed_again(tiny):

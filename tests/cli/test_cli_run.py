@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import xarray as xr
 import yaml
-from conftest import REPOSITORY, copy_project, snakemake
+from conftest import REPOSITORY, copy_project
 from tiny_campaign import CAMPAIGN as TINY
 
 # The material sticks so strongly that its runs fail.
@@ -90,6 +90,7 @@ def test_a_job_that_crashes_is_named_with_its_log_and_stops_no_other(project):
     assert "Error in rule run" in log.read_text()
 
 
+@pytest.mark.slow
 def test_an_end_that_physics_decides_is_a_result(project):
     output = run(project, "dataset")
     assert "1 run ended before the last target, as physics decides; all reasons: results/tiny/logs/ended" in output
@@ -165,29 +166,6 @@ def test_a_dry_run_prints_the_plan_and_the_number_of_jobs(project):
     assert output.endswith("\n1 job would run.\n")
     assert not any(words in output for words in ("Job stats", "host:", "Building DAG", "reason:")), output
     assert not (project / "results/planned").exists()
-
-
-def contents(folder):
-    return {file: (file.read_bytes(), file.stat().st_mtime_ns) for file in folder.rglob("*") if file.is_file()}
-
-
-@pytest.mark.slow
-def test_snakemake_refuses_a_copy_of_a_configuration_with_the_same_name(project, tmp_path):
-    original = tmp_path / "asked/small.yaml"
-    original.parent.mkdir()
-    original.write_text(CAMPAIGN.replace("name: tiny", "name: small"))
-    assert snakemake(project, "surfaces", configuration=original).returncode == 0
-    results = project / "results/small"
-    record = (results / "belongs_to.txt").read_text().strip()
-    assert (project / record).resolve() == original.resolve() and not record.startswith("/")
-    before = contents(results)
-    copy = project / "config/campaigns/copy.yaml"
-    copy.write_text(original.read_text().replace("grid: 32", "grid: 64"))
-    for arguments in ([], ["--dry-run"]):
-        refused = snakemake(project, "surfaces", *arguments, configuration=copy)
-        assert refused.returncode == 1 and "Traceback" not in refused.stdout
-        assert "config/campaigns/copy.yaml has the same `name: small`" in refused.stdout
-    assert contents(results) == before
 
 
 @pytest.mark.slow

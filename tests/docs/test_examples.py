@@ -11,6 +11,8 @@ from icha.datasets.files import read_campaign
 
 EXAMPLES = Path(__file__).parents[2] / "docs/examples"
 OF_CAMPAIGNS = {"read_campaign", "own_figure"}
+# Scripts that take a second or more.
+LONG = {"loop", "finite_range", "interval", "area_and_separation", "lens"}
 # For each script a variable, its value, and the largest relative difference.
 NUMBERS = {
     "sphere": ("ratio", 1, 0.01),  # JKR
@@ -35,7 +37,7 @@ def test_every_example_has_a_test():
     assert {path.stem for path in EXAMPLES.iterdir()} == NUMBERS.keys() | OF_CAMPAIGNS
 
 
-@pytest.mark.parametrize("name", NUMBERS)
+@pytest.mark.parametrize("name", [pytest.param(each, marks=[pytest.mark.slow] * (each in LONG)) for each in NUMBERS])
 def test_a_number_of_each_example(name):
     variable, value, difference = NUMBERS[name]
     np.testing.assert_allclose(runpy.run_path(str(EXAMPLES / f"{name}.py"))[variable], value, rtol=difference)

@@ -55,21 +55,3 @@ def test_a_killed_call_loses_only_what_was_being_computed(whole_group, tmp_path)
     assert sum(after[name] == file for name, file in before.items()) >= len(before) - (not whole_group)
     assert not list((project / "results").rglob(".*.part"))
     assert "Nothing to be done" in snakemake(project, "runs", configuration=CONFIGURATION).stdout
-
-
-def test_two_calls_at_once_and_temporary_files_of_killed_calls(project, monkeypatch):
-    monkeypatch.syspath_prepend(str(REPOSITORY / "workflow"))
-    import prepare
-
-    (project / "results/smoke/verdict.txt").unlink()
-    left = project / "results/smoke/publish/.smoke-1.0.0.zip.0a1b2c3d.part"
-    left.write_bytes(b"a part")
-    monkeypatch.chdir(project)
-    assert prepare.hold_lock(".snakemake/smoke.lock") is None
-    refused = snakemake(project)
-    assert refused.returncode != 0 and "Traceback" not in refused.stdout
-    assert f"Process {os.getpid()} is running this campaign" in refused.stdout
-    assert not (project / "results/smoke/verdict.txt").exists()
-    prepare.locks.pop().close()
-    assert snakemake(project).returncode == 0
-    assert (project / "results/smoke/verdict.txt").exists() and not left.exists()

@@ -158,6 +158,28 @@ def test_another_licence_is_stated_without_computing(prepare):
         assert read_dataset(path).equals(DATASET)
 
 
+def test_two_calls_at_once_and_temporary_files_of_killed_calls(prepare):
+    left = Path("results/tiny/publish/.tiny-1.0.0.zip.0a1b2c3d.part")
+    left.parent.mkdir(parents=True)
+    left.write_bytes(b"a part")
+    assert prepare.hold_lock(".snakemake/tiny.lock") is None
+    with pytest.raises(SystemExit, match=f"Process {os.getpid()} is running this campaign"):
+        prepare.Results("results/tiny", "tiny.yaml", {}).begin()
+    assert left.exists()
+    prepare.locks.pop().close()
+    prepare.Results("results/tiny", "tiny.yaml", {}).begin()
+    assert not left.exists()
+
+
+@pytest.mark.parametrize("dry_run", [False, True])
+def test_results_of_another_configuration_of_the_same_name_are_refused(dry_run, prepare):
+    Path("tiny.yaml").touch()
+    prepare.Results("results/tiny", "tiny.yaml", {}).begin()
+    assert Path("results/tiny/belongs_to.txt").read_text() == "tiny.yaml\n"
+    with pytest.raises(SystemExit, match=r"copy\.yaml has the same `name: tiny`"):
+        prepare.Results("results/tiny", "copy.yaml", {}, dry_run=dry_run)
+
+
 def test_targets_are_found_among_the_arguments_of_snakemake(prepare):
     arguments = ["snakemake", "--cores", "2", "runs", "--configfile", "config/all.yaml", "results/tiny/report.html"]
     assert prepare.targets_of(arguments) == ["runs", "results/tiny/report.html"]

@@ -72,8 +72,7 @@ def test_all_promised_files_exist(smoke):
 def test_the_dataset_states_its_origin(smoke):
     campaign = load_configuration(smoke / "results/smoke/config.used.yaml").campaign
     with xr.open_datatree(smoke / "results/smoke/dataset/smoke.nc") as tree:
-        assert set(tree.children) == {"challenge", "multi_slope", "multi_slope_truth", "pull", "pull_far", "uncertain"}
-        assert tree["multi_slope_truth"]["model"].values.tolist() == ["boundary_elements"]
+        assert set(tree.children) == {"challenge", "multi_slope", "pull", "uncertain"}
         assert tree["challenge"]["model"].values.tolist() == ["asperities", "boundary_elements"]
         assert not tree["challenge"]["status"].values.any()
         attraction = tree["challenge"]["attraction"].isel(model=1, surface=0, seed=0, rms_slope=0)
@@ -108,20 +107,20 @@ def test_no_paths_users_hosts_or_times_in_results(smoke):
     assert traces(files, [each.encode() for each in (*places, *TRACES.values())], (now - 86400, now)) == []
 
 
-def test_a_second_call_does_nothing(smoke, tmp_path):
+def test_a_second_call_does_nothing(smoke):
     def times():
         return {file: file.stat().st_mtime_ns for file in (smoke / "results").rglob("*")}
 
     before = times()
     again = snakemake(smoke, "all", "references", "publish", "--snakefile", "workflow/Snakefile")
-    assert "report_page" in snakemake(smoke, "-n", "-d", str(tmp_path), "--snakefile", "workflow/Snakefile").stdout
     assert again.returncode == 0 and "Nothing to be done" in again.stdout
     assert times() == before
 
 
 def test_a_large_campaign_can_be_planned(smoke, tmp_path):
     configuration = REPOSITORY / "config/campaigns/validation.yaml"
-    plan = snakemake(smoke, "all", "publish", "-n", "-d", str(tmp_path), configuration=configuration)
+    elsewhere = ("-n", "-d", str(tmp_path), "--snakefile", "workflow/Snakefile")
+    plan = snakemake(smoke, "all", "publish", *elsewhere, configuration=configuration)
     assert plan.returncode == 0 and "analyse" in plan.stdout and "deposit" in plan.stdout, plan.stdout
 
 
@@ -165,6 +164,7 @@ def test_wrong_values_on_the_command_line_are_messages_and_confirmed_ones_warnin
     assert "materials.mu_1.interaction_range: '6.213 nm' is unusual" in configuration_of(RANGE)
 
 
+@pytest.mark.slow
 def test_the_report_of_snakemake_contains_every_figure_with_its_caption(smoke, tmp_path):
     done = snakemake(smoke, "--report", str(tmp_path / "report.html"))
     assert done.returncode == 0, done.stdout
