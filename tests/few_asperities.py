@@ -115,4 +115,4 @@ def small():
 @cache
 def united_run():
     """A small sticky surface on which two spots unite, pressed and pulled off."""
-    return icha.simulate(*small(), Path([5e-2], unload=True))
+    return icha.simulate(*small(), Path([3.5e-2], unload=True))

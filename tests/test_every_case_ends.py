@@ -209,7 +209,7 @@ def test_loops_that_gain_energy_or_move_apart_in_loading_are_marked(series):
     are_marked()
 
 
-@pytest.mark.parametrize("strength", [1.0, 3.0, 10.0])
+@pytest.mark.parametrize("strength", [1.0, 10.0])
 def test_a_sticky_surface_is_called_sticky(strength):
     # More surface energy than it takes to press the summits flat.
     surface = SelfAffineSpectrum(PERIOD, 0.2 * PERIOD, PERIOD / 8, 0.8, 0.2).realise(64, 1)

@@ -1,4 +1,4 @@
-"""Invariances of both models on random contacts: units, position and direction, range, steps, threads."""
+"""Invariances of both models on random contacts: units, position and direction, range, threads."""
 
 import numpy as np
 import pytest
@@ -131,22 +131,6 @@ def test_adhesion_vanishes_with_its_energy(contact):
     if expected["coalescence_count"].max() == 0:
         assert error[0] <= 1e-2 and error[1] <= 0.2 * error[0] + SAME[DEFAULT_MODEL]
     assert error[1] <= STEPS_WITH_UNIONS
-
-
-@BOTH
-@SOME
-@given(st.data())
-def test_steps_change_nothing_but_unions(model, data):
-    surface, material = data.draw(contacts(model))
-    long, short = (pressed(surface, material, model, max_step=step) for step in (0.5, 0.05))
-    assert long.sizes["step"] == short.sizes["step"]
-    united = model == DEFAULT_MODEL and int(short["coalescence_count"].max()) > 0
-    if not united:
-        # Patches that meet within a step count as one.
-        assert_same(long, short, SAME[model], counts=["spot_count"])
-    np.testing.assert_allclose(
-        long["contact_area_fraction"], short["contact_area_fraction"], rtol=STEPS_WITH_UNIONS, err_msg="area"
-    )
 
 
 @BOTH

@@ -46,13 +46,8 @@ def run(request):
     return run_of(rough(), material, snapshots=[("reduced_pressure", 5e-3), ("area_fraction", 0.06)])
 
 
-def test_every_variable_carries_unit_and_name_and_no_nan(run):
-    for name, variable in run.variables.items():
-        assert variable.attrs["units"], name
-        assert variable.attrs["long_name"], name
-        if variable.dtype.kind == "f":
-            assert np.all(np.isfinite(variable.values)) or "infinite" in variable.attrs, name
-            assert not np.any(np.isnan(variable.values)), name
+def test_the_dataset_has_the_documented_format(run):
+    assert problems_with_file(RUN, run) == []
     for name in ("title", "summary", "Conventions", "source", "campaign", "study", "config_sha256", "license"):
         assert name in run.attrs
     assert set(run.branch.values) == {"loading"}
@@ -102,12 +97,9 @@ def test_statistics_in_the_dataset_are_those_of_the_surface(run):
     assert (float(run.stickiness) > 0) == (float(run.surface_energy) > 0)
 
 
-@pytest.mark.parametrize(("material", "seed"), [(ADHESIVE, 1), (BARE, 2)], ids=["adhesive", "bare"])
-def test_refining_the_grid_of_one_spectrum(material, seed):
+def test_refining_the_grid_of_one_spectrum():
     pressures = [1e-3, 3e-3, 1e-2, 3e-2]
-    areas = {
-        grid: run_of(rough(grid, seed), material, pressures).contact_area_fraction.values for grid in (64, 128, 256)
-    }
+    areas = {grid: run_of(rough(grid), ADHESIVE, pressures).contact_area_fraction.values for grid in (64, 128, 256)}
     # From 4 to 8 and from 8 to 16 cells per shortest wavelength.
     np.testing.assert_allclose(areas[64], areas[128], rtol=0.02)
     np.testing.assert_allclose(areas[128], areas[256], rtol=0.002)

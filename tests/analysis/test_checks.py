@@ -110,11 +110,10 @@ def test_runs_that_come_back_pass(material):
     assert float(run["hysteresis_loss"]) > 0 or material == "hertz"
 
 
-@pytest.mark.parametrize("tabor", [0.8, 1.1])
-def test_a_path_that_ends_in_contact_may_have_gained_energy_in_its_jumps(tabor):
+def test_a_path_that_ends_in_contact_may_have_gained_energy_in_its_jumps():
     """Where the range is long the jump into contact is uphill; the jump off it, which loses more, is still to come."""
     turns = [("reduced_pressure", 5e-4), ("reduced_pressure", 1e-3)]
-    material, path = icha.Material(1.0, 1.0, 1 / tabor), icha.Path([1e-3], turning_points=turns)
+    material, path = icha.Material(1.0, 1.0, 1.0), icha.Path([1e-3], turning_points=turns)
     run = icha.simulate(paraboloid(32, 16.0), material, path)
     assert float(run["dissipated_by_jump_in"][-1]) < 0
     assert failed(run) == set()

@@ -38,12 +38,12 @@ def test_a_closed_and_opened_cell_dissipates_the_difference_of_both_works():
         np.testing.assert_allclose(cost - gained, 2.0 * fraction, rtol=1e-12)
 
 
-def loop(cells, ratio, deep, grid=64, interaction_range=1e-9):
+def loop(cells, ratio, deep, grid=48):
     """Return a loop of a smooth sphere whose largest contact radius has about `cells` cells."""
     a = deep * (ADVANCING * RADIUS**2 / MODULUS) ** (1 / 3)
     side = grid * a / cells
     surface = Surface(np.zeros((grid, grid)), side, "free", Sphere(RADIUS))
-    material = Material(MODULUS, (ADVANCING, ratio * ADVANCING), interaction_range=interaction_range)
+    material = Material(MODULUS, (ADVANCING, ratio * ADVANCING), interaction_range=1e-9)
     depth = float(sphere_contact(a, RADIUS, MODULUS, ADVANCING).indentation)
     return simulate(surface, material, Path(indentations=[depth], unload=True, snapshots=[]), model=MODEL)
 

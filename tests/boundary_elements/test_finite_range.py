@@ -66,7 +66,7 @@ def test_rough_contact_has_the_energy_that_an_independent_minimiser_finds():
 
 def test_full_contact_of_a_resolved_strength_opens_at_this_strength():
     """Johnson's wave: contact is complete at p*, and opens where the trough bears the strength, p*/2."""
-    surface, top = wave(96, 1e-3, 1e-5), np.pi * MODULUS * 1e-5 / 1e-3
+    surface, top = wave(64, 1e-3, 1e-5), np.pi * MODULUS * 1e-5 / 1e-3
     energy = (0.2 * np.pi * 1e-2 / np.sqrt(2)) ** 2 * MODULUS * 1e-3
     material = icha.Material(MODULUS, energy, 2 * 16 * energy / (9 * np.sqrt(3) * top))
     assert material.interface_strength == pytest.approx(top / 2)

@@ -109,7 +109,7 @@ def test_full_contact_opens_at_the_strength_of_its_flaw():
     assert float(run.nominal_pressure.values[full].min()) == pytest.approx(opening, rel=1e-6)
 
 
-@pytest.mark.parametrize("number", [0, 1, 5])
+@pytest.mark.parametrize("number", [1, 5])
 def test_random_loops_end(number):
     """All of them are run by `python -m validation.random_loops`."""
     assert follow_loop(random_loop(number, grid=48)) == ""

@@ -7,7 +7,6 @@ import pytest
 from scipy.optimize import minimize
 
 import icha
-from icha.asperity.jkr import JKR
 from icha.boundary_elements.contact import contact_of
 from icha.boundary_elements.elastic import HalfSpace
 from icha.boundary_elements.laws import AtDistance, Cohesive, ShortRange, average
@@ -106,24 +105,9 @@ UNIFORM = np.ones(HEIGHTS.shape)
 
 def contact_with_factors(attraction, factors):
     """Return a contact with a law of attraction whose work of adhesion has a factor in each cell, (n, n)."""
-    if attraction is Cohesive:
-        contact = contact_of(SURFACE, material_of(0.3, 0.5))
-        law = contact.attraction
-        return dataclasses.replace(contact, attraction=Cohesive(law.adhesion_length * factors, law.strength))
-    material = material_of(0.03, 1e-6)
-    contact = contact_of(SURFACE, material)
-    law, summits = contact.attraction, contact.summit_cells
-    jump_in, radius = law.jump_in.copy(), law.radius.copy()
-    for cell, curvature_radius in zip(summits, contact.asperities.radius_of_curvature, strict=True):
-        before, after = (
-            JKR(dataclasses.replace(material, surface_energy=material.surface_energy * factor))
-            for factor in (1.0, factors.ravel()[cell])
-        )
-        approach = after.jump_in_approach(curvature_radius)
-        jump_in.ravel()[cell] += (before.jump_in_approach(curvature_radius) - approach) / SURFACE.spacing
-        radius.ravel()[cell] = after.contact_radius(approach, curvature_radius) / SURFACE.spacing
-    striped = ShortRange(law.adhesion_length * factors, law.strength, jump_in, radius)
-    return dataclasses.replace(contact, attraction=striped)
+    material = material_of(*((0.3, 0.5) if attraction is Cohesive else (0.03, 1e-6)))
+    works = material.surface_energy * factors
+    return contact_of(SURFACE, icha.Material(MODULUS, works, material.interaction_range))
 
 
 @pytest.mark.parametrize("attraction", [Cohesive, ShortRange])

@@ -47,7 +47,7 @@ def test_a_stop_is_the_same_in_five_and_in_fifty_steps():
 
 def test_a_load_is_met_with_the_same_area_in_one_step_and_in_several():
     """In a long step, cells may close for a moment, and must be free to open again."""
-    surface = icha.SelfAffineSpectrum(1e-4, 1e-4, 1e-4 / 24, 0.8, 1.0).realise(192, 1)
+    surface = icha.SelfAffineSpectrum(1e-4, 1e-4, 1e-4 / 16, 0.8, 1.0).realise(128, 1)
     material = icha.Material(1e6, 1e-4, 1e-10)
     areas = []
     for loads in ([0.01, 0.1], np.geomspace(0.01, 0.1, 6).tolist()):

@@ -13,7 +13,7 @@ SURFACE = SelfAffineSpectrum(1e-6, 1e-6, 0.5e-6, 0.8).realise(16, 1).scaled_to_r
 PATHS = {
     "unloading": (Material(1e6, 1e-4, 1e-9), Path(reduced_pressures=[2e-3], unload=True, max_step=0.5)),
     "areas": (Material(1e6, 0.01, 1e-8), Path(area_fractions=[0.05, 0.1])),
-    "a failure": (Material(1e6, 0.01, 1e-8), Path(area_fractions=[1e-4, 0.05])),
+    "a failure": (Material(1e6, 0.01, 1e-8), Path(area_fractions=[1e-4, 0.05], max_step=0.5)),
 }
 
 

@@ -29,11 +29,7 @@ def large():
     return SelfAffineSpectrum(PERIOD, 0.2 * PERIOD, PERIOD / 32, 0.8).realise(128, 1)
 
 
-BOTH = pytest.mark.parametrize("material", [ADHESIVE, BARE], ids=["adhesive", "bare"])
-
-
-@BOTH
-def test_targets_of_every_kind_are_met_exactly_and_in_the_order_of_the_path(surface, material):
+def test_targets_of_every_kind_are_met_exactly_and_in_the_order_of_the_path(surface):
     height = surface.rms_height
     snapshots = [("relative_load", 7e-3), ("mean_separation", 1.7 * height), ("area_fraction", 0.013)]
     snapshots += [("force", 6e-4), ("indentation", -1.6 * height), ("contact_radius", 7e-6)]
@@ -47,7 +43,7 @@ def test_targets_of_every_kind_are_met_exactly_and_in_the_order_of_the_path(surf
         {"indentations": [-2.2 * height, -1.1 * height]},
         {"contact_radii": [2e-6, 1.2e-5]},
     ):
-        run = simulate(surface, material, Path(**stops, snapshots=snapshots))
+        run = simulate(surface, ADHESIVE, Path(**stops, snapshots=snapshots))
         assert run.sizes["step"] == len(next(iter(stops.values()))) + 7
         reached = {
             "reduced_pressure": run.nominal_pressure / (MODULUS * surface.rms_slope),
@@ -63,7 +59,6 @@ def test_targets_of_every_kind_are_met_exactly_and_in_the_order_of_the_path(surf
             kind, target = str(run.step_kind[step].item()), float(run.step_target[step])
             assert float(reached[kind][step]) == pytest.approx(target, rel=1e-9), (kind, target)
         assert np.all(np.diff(run.mean_separation) < 0) and np.all(np.diff(run.contact_area_fraction) > 0)
-        assert material is ADHESIVE or np.all(np.diff(run.nominal_pressure) > 0)
         assert np.all(run.residual <= RESIDUAL_TOLERANCE)
         assert sorted(run.snapshot_kind.values) == sorted(kind for kind, _ in snapshots)
         assert "in N where snapshot_kind is force" in run.snapshot_target.attrs["comment"]
@@ -81,23 +76,21 @@ def test_a_target_that_is_also_a_snapshot_is_one_step(surface):
         assert [t.snapshot for t in Path(area_fractions=[0.01, 0.02], snapshots=snapshots).targets] == expected
 
 
-@BOTH
-def test_a_state_does_not_depend_on_the_kind_of_its_target(surface, material):
-    one = simulate(surface, material, Path([2e-2]))
+def test_a_state_does_not_depend_on_the_kind_of_its_target(surface):
+    one = simulate(surface, ADHESIVE, Path([2e-2]))
     for path in (
         Path(area_fractions=[float(one.contact_area_fraction[0])]),
         Path(mean_separations=[float(one.mean_separation[0])]),
         Path([0.1], snapshots=[("relative_load", 2e-2 * surface.rms_slope)]),
     ):
-        other = simulate(surface, material, path)
+        other = simulate(surface, ADHESIVE, path)
         for name in ("contact_area_fraction", "nominal_pressure", "mean_separation", "contact_stiffness"):
             assert float(other[name][0]) == pytest.approx(float(one[name][0]), rel=1e-7), name
 
 
-@BOTH
-def test_steps_of_half_the_length_and_more_targets_change_the_area_by_less_than_a_per_cent(large, material):
-    few = simulate(large, material, Path([1e-3, 1e-2], max_step=0.1))
-    many = simulate(large, material, Path([3e-4, 1e-3, 2e-3, 5e-3, 1e-2], max_step=0.05))
+def test_steps_of_half_the_length_and_more_targets_change_the_area_by_less_than_a_per_cent(large):
+    few = simulate(large, ADHESIVE, Path([1e-3, 1e-2], max_step=0.1))
+    many = simulate(large, ADHESIVE, Path([3e-4, 1e-3, 2e-3, 5e-3, 1e-2], max_step=0.05))
     for name in ("contact_area_fraction", "mean_separation"):
         np.testing.assert_allclose(many[name][[1, -1]], few[name], rtol=0.01)
 

@@ -12,7 +12,7 @@ MATERIAL = icha.Material(contact_modulus=MODULUS, surface_energy=ENERGY, interac
 
 
 def sphere():
-    return icha.Surface(np.zeros((64, 64)), period=400e-6, boundary="free", shape=icha.Sphere(RADIUS))
+    return icha.Surface(np.zeros((48, 48)), period=300e-6, boundary="free", shape=icha.Sphere(RADIUS))
 
 
 def simulate(**path):

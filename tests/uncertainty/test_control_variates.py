@@ -41,8 +41,7 @@ def test_seeds_that_a_level_lacks_are_left_out_of_the_next_level():
     assert estimate_mean(cheap, dear, {}) is None
 
 
-@pytest.mark.parametrize(("coarse_count", "fine_count"), [(4, 2), (8, 3)])
-def test_intervals_contain_the_mean_as_often_as_they_promise(coarse_count, fine_count):
+def test_intervals_contain_the_mean_as_often_as_they_promise():
     """Levels with the correlations that were measured at p* = 1e-2: 0.6 with asperities, 0.99 between the grids."""
     rng, inside, width, plain = np.random.default_rng(2), 0, [], []
     for _ in range(2000):
@@ -50,11 +49,11 @@ def test_intervals_contain_the_mean_as_often_as_they_promise(coarse_count, fine_
         fine = 0.085 * shared
         coarse = fine + 0.05 + 0.01 * rng.normal(size=50)
         asperities = -0.1 + 0.08 * (0.6 * shared + 0.8 * rng.normal(size=50))
-        found = estimate_mean(by_seed(asperities), by_seed(coarse[:coarse_count]), by_seed(fine[:fine_count]))
+        found = estimate_mean(by_seed(asperities), by_seed(coarse[:4]), by_seed(fine[:2]))
         half = np.linalg.norm([found.scatter, found.model, found.refinement])
         inside += abs(found.mean) <= half
         width.append(half)
-        plain.append(estimate_mean({}, {}, by_seed(fine[:fine_count])).half_width)
+        plain.append(estimate_mean({}, {}, by_seed(fine[:2])).half_width)
     assert 0.85 <= inside / 2000 <= 0.97
     assert np.median(width) < 0.6 * np.median(plain)
 
