@@ -1,15 +1,9 @@
 """The layout page agrees with the code, and folders import only in its order."""
 
 import importlib.util
-import os
 import re
-import shutil
-import subprocess
-import sys
 import tomllib
-from pathlib import Path
 
-import pytest
 from conftest import REPOSITORY
 
 PAGE = (REPOSITORY / "docs/layout.md").read_text(encoding="utf-8")
@@ -47,27 +41,3 @@ def test_modules_on_the_page_on_the_model_exist():
     named = re.findall(r"`([\w.]+)`", " ".join(re.findall(r" \[(`[^\]]+`)\]", page)))
     assert len(named) > 25
     assert not [name for name in named if importlib.util.find_spec(f"icha.{name}") is None]
-
-
-@pytest.mark.parametrize(
-    ("module", "line", "broken"),
-    [
-        ("path/targets.py", "import icha.simulation", "Data flows one way"),
-        ("simulation/record.py", "import snakemake", "The physics knows nothing of the workflow"),
-    ],
-)
-def test_a_reversed_import_is_refused(module, line, broken, tmp_path):
-    shutil.copytree(REPOSITORY / "icha", tmp_path / "icha", ignore=shutil.ignore_patterns("__pycache__"))
-    shutil.copyfile(REPOSITORY / "pyproject.toml", tmp_path / "pyproject.toml")
-    with (tmp_path / "icha" / module).open("a", encoding="utf-8") as file:
-        file.write(f"\n\ndef reversed_import():\n    {line}\n")
-    done = subprocess.run(
-        [Path(sys.executable).parent / "lint-imports", "--no-cache"],
-        cwd=tmp_path,
-        env=os.environ | {"PYTHONPATH": str(tmp_path)},
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 1
-    assert re.search(rf"{broken}.* BROKEN", done.stdout), done.stdout
-    assert done.stdout.count("BROKEN") == 1

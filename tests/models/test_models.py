@@ -118,19 +118,6 @@ def test_model_is_the_first_dimension_of_every_study(runs, tmp_path):
     assert "Griffith" in tree.attrs["references"] and "Violano" in tree.attrs["references"]
 
 
-def test_every_run_of_both_models_is_taken_out_unchanged(runs):
-    tree = campaign_tree(runs.items())
-    for each, original in runs.items():
-        taken = select_run(tree, each)
-        assert taken.attrs["contact_model"] == each.model
-        kept = set(original.variables) - MAPS
-        assert set(taken.variables) - {"model", "surface", "material"} == kept
-        for name in kept:
-            np.testing.assert_array_equal(taken[name].values, original[name].values, err_msg=f"{each} {name}")
-    with pytest.raises(ValueError, match=r"no model 'other'; expected one of asperities, boundary_elements"):
-        select_run(tree, labels("other"))
-
-
 @pytest.mark.slow
 def test_asperities_end_at_the_limit_of_their_range_beside_boundary_elements(tmp_path):
     path = icha.Path([0.05, 0.1, 0.3], unload=True, snapshots=[("reduced_pressure", 0.3)])

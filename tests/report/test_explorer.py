@@ -46,9 +46,9 @@ def contact_of(data, labels):
     return next(each for each in data["contacts"] if tuple(each[name] for name in names) == wanted)
 
 
-def plain(folder, labels):
-    """Read a run of the campaign dataset, with its steps and spots, with xarray only."""
-    study = xr.open_datatree(folder / "dataset/small.nc")[labels.study].to_dataset()
+def plain(tree, labels):
+    """Return a run of the campaign dataset, with its steps and spots."""
+    study = tree[labels.study].to_dataset()
     names = ("model", "surface", "seed", "rms_slope", "material")
     run = study.sel({name: getattr(labels, name) for name in names})
     own = np.ones(study.sizes["spot"], bool)
@@ -59,8 +59,9 @@ def plain(folder, labels):
 
 @pytest.mark.parametrize("model", ["asperities", "boundary_elements"])
 def test_numbers_are_those_of_the_dataset(folder, data, model):
+    tree = xr.open_datatree(folder / "dataset/small.nc").load()
     for labels in (each for each in runs() if each.model == model and each != NOTHING):
-        shown, run = contact_of(data, labels), plain(folder, labels)
+        shown, run = contact_of(data, labels), plain(tree, labels)
         (_, _, area), (_, _, gap) = shown["curves"]
         close = {"rtol": 1e-4}
         np.testing.assert_allclose(area[model], [run["reduced_pressure"], run["contact_area_fraction"]], **close)

@@ -125,11 +125,6 @@ def test_the_slider_moves_contact_points_and_distributions_of_both_models(page):
     np.testing.assert_allclose(last["points"][0], end, atol=0.01)
 
 
-def test_failures_are_in_words(page):
-    choose(page, study="slopes", rms_slope=0.2, material="hertz")
-    assert "asperities failed: the path ends early, at A/A0 < 1 &" in shown(page)["words"]
-
-
 def test_spots_have_the_positions_of_the_dataset(page):
     """Centres of circles are red, and the red fraction of the map is that of the spots."""
     choose(page, study="one", material="soft")
@@ -162,16 +157,6 @@ def test_nothing_is_wider_than_the_window(page, width):
     page.value("scrollTo(0, 1500)")
     page.settle()
     assert page.value("document.querySelector('form').getBoundingClientRect().top") == 0
-
-
-def test_errors_and_requests_are_detected(browser, explorer_file, tmp_path):
-    text = re.sub("<meta http-equiv.*?>", "", explorer_file.read_text(encoding="utf-8"))
-    wrong = '<img src="http://localhost:9/x.png"><script>nothing.at.all;</script></body>'
-    (tmp_path / "wrong.html").write_text(text.replace("</body>", wrong), encoding="utf-8")
-    browser.console.clear(), browser.addresses.clear()
-    browser.open(tmp_path / "wrong.html")
-    assert "http://localhost:9/x.png" in browser.addresses
-    assert any("nothing is not defined" in line for line in browser.console)
 
 
 # --- the report -------------------------------------------------------------------------------------------------
