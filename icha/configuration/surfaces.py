@@ -280,16 +280,8 @@ class MaterialSection(Section):
         return {**content, "surface_energy": f"{mean!r} J/m^2", "adhesion_map": energy}
 
     @model_validator(mode="after")
-    def _check_directions(self):
-        if self.receding_energy is not None and not 0 < self.surface_energy <= self.receding_energy:
-            raise ValueError(
-                f"surface_energy: advancing {self.surface_energy:g} J/m^2, receding {self.receding_energy:g} J/m^2; "
-                "expected 0 < advancing <= receding"
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _check_layer(self):
+    def _check(self):
+        _ = self.material  # raises ValueError for works of adhesion that do not fit each other
         if self.thickness is not None and self.poisson_ratio is None:
             reason = f"the key is missing; a layer with thickness {formatting.length(self.thickness)} needs it"
             raise ValueError(f"poisson_ratio: {reason}; expected {POISSON_RATIO.expected}, such as 0.5 for rubber")

@@ -66,7 +66,7 @@ def inspect_file(section: MeasuredSurface | FileSurface | SpectrumSurface) -> To
             from icha.surfaces.measured.defects import repeated_height
 
             topography = read_topography(section)
-            surface, repeated = _with_shape(topography.surface, section), repeated_height(topography.square.heights)
+            surface, repeated = _in_place(topography.surface, section), repeated_height(topography.square.heights)
         else:
             surface = read_surface(section)
         slope, height = surface.rms_slope, surface.rms_height
@@ -97,49 +97,43 @@ def read_topography(section: MeasuredSurface) -> PreparedTopography:
     return prepared_topography(section.path, section.preparation | {"size": section.size})
 
 
-def read_surface(section: MeasuredSurface | FileSurface | SpectrumSurface, seed: int = 1) -> Surface:
-    """Read a surface from a file, and prepare the surface with the keys of its section.
-
-    For a spectrum, return the realisation with this seed.
+def read_surface(section: MeasuredSurface | FileSurface | SpectrumSurface) -> Surface:
+    """Read a surface from a file, and prepare it with the keys of its section; of a spectrum, the realisation 1.
 
     A ValueError about the shape has the attribute `key`.
     """
     # The modules below import SciPy, which takes time; campaigns without surfaces from files do not need SciPy.
-    if isinstance(section, MeasuredSurface):
-        return _with_shape(read_topography(section).surface, section)
+    from icha.surfaces.measured.scan import read_height_map
     from icha.surfaces.surface import Surface
 
-    if isinstance(section, SpectrumSurface):
+    if isinstance(section, MeasuredSurface):
+        surface = read_topography(section).surface
+    elif isinstance(section, SpectrumSurface):
         with warnings.catch_warnings():
             # The configuration asks about coarse grids itself.
             warnings.simplefilter("ignore", IchaWarning)
-            surface = _spectrum(section).realise(section.grid, seed, section.amplitudes)
-        return _with_shape(replace(surface, boundary="free") if section.free else surface, section)
-    from icha.surfaces.measured.scan import read_height_map
-
-    surface = Surface(
-        read_height_map(section.path, section.height_unit), section.period, "free" if section.free else "periodic"
-    )
-    return _with_shape(surface, section)
+            surface = _spectrum(section).realise(section.grid, 1, section.amplitudes)
+    else:
+        surface = Surface(read_height_map(section.path, section.height_unit), section.period)
+    return _in_place(surface, section)
 
 
 def _spectrum(section: SpectrumSurface) -> TabulatedSpectrum:
     """Read the spectrum of a surface of kind `spectrum`, in its periodic cell."""
     from icha.surfaces.tabulated_spectrum import read_spectrum_table
 
-    table = read_spectrum_table(section.path, section.length_unit, section.convention)
-    return table.in_cell(section.period)
+    return read_spectrum_table(section.path, section.length_unit, section.convention).in_cell(section.period)
 
 
-def _with_shape(surface, section):
-    """Return a surface with the shape of its section; raise ValueError if the shape does not fit the square."""
+def _in_place(surface, section):
+    """Return a surface with the boundary and the shape of its section; raise ValueError if the shape does not fit."""
     if section.shape is None:
-        return surface
+        return surface if surface.free == section.free else replace(surface, boundary="free")
     if problem := section.shape.problem(surface.period, surface.grid):
         error = ValueError(problem.removeprefix("shape: "))
         error.key = "shape"
         raise error
-    return replace(surface, shape=section.shape.shape)
+    return replace(surface, boundary="free", shape=section.shape.shape)
 
 
 def read_scan(path: str | os.PathLike, *, confirmed: Collection[str] = (), **keywords: Any) -> Surface:
@@ -180,7 +174,7 @@ def read_scan(path: str | os.PathLike, *, confirmed: Collection[str] = (), **key
         measured = MeasuredSurface.model_validate(section)
         refuse(source, unconfirmed(unusual_values({"surfaces": {"scan": section}})))
         topography = read_topography(measured)
-        surface = _with_shape(topography.surface, measured)
+        surface = _in_place(topography.surface, measured)
     except ValidationError as error:
         problems = [{**details, "loc": ("surfaces", "scan", "measured", *details["loc"])} for details in error.errors()]
         refuse(

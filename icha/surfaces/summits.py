@@ -380,27 +380,20 @@ class SummitCoverage:
             occupied[(y + down - 2) % grid, (x + across - 2) % grid] = True
         return cls(heights[row, column], occupied[row, column], asperities.height, asperities.unsupported_height)
 
-    def uncovered_share(self, separation: float) -> float:
-        """Return the share (0 to 1) of the load that acts on peaks without a summit, at a mean separation (m).
+    def reasons_against(self, separations: Iterable[float]) -> list[str]:
+        """Return reasons (sentences) why asperities do not represent the surface at these mean separations (m).
 
         The load on a peak is estimated with Hertz's law: it is proportional to (peak height - separation)^(3/2). If no
         peak is higher than the separation, only the highest peak counts.
         """
-        load = np.maximum(self.peak_height - separation, 0.0) ** 1.5
-        if not load.any():
-            return float(not self.covered[np.argmax(self.peak_height)])
-        return float(np.sum(load[~self.covered]) / np.sum(load))
-
-    def unsupported_share(self, separation: float) -> float:
-        """Return the share (0 to 1) of unsupported summits among the summits higher than the mean separation (m)."""
-        unsupported = int(np.count_nonzero(self.unsupported_height > separation))
-        return unsupported / max(unsupported + int(np.count_nonzero(self.summit_height > separation)), 1)
-
-    def reasons_against(self, separations: Iterable[float]) -> list[str]:
-        """Return reasons (sentences) why asperities do not represent the surface at these mean separations (m)."""
-        separations = np.unique(list(separations))
-        uncovered = max(map(self.uncovered_share, separations), default=0.0)
-        unsupported = max(map(self.unsupported_share, separations), default=0.0)
+        uncovered = unsupported = 0.0
+        for separation in np.unique(list(separations)):
+            load = np.maximum(self.peak_height - separation, 0.0) ** 1.5
+            if not load.any():
+                load[np.argmax(self.peak_height)] = 1.0
+            uncovered = max(uncovered, float(np.sum(load[~self.covered]) / np.sum(load)))
+            excluded, used = (int(np.sum(h > separation)) for h in (self.unsupported_height, self.summit_height))
+            unsupported = max(unsupported, excluded / max(excluded + used, 1))
         shares = {
             "{:.0f} % of the load would be on peaks of the surface that have no summit": uncovered,
             "the nodes do not support {:.0f} % of the summits that would touch": unsupported,
