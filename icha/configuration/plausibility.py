@@ -81,12 +81,7 @@ def unusual_topography(
 ) -> Iterator[Unusual]:
     """For a topography from a file, yield the size, the rms slope and a repeated height if they are unusual.
 
-    Parameters
-    ----------
-    location, section : keys that lead to the surface in the configuration, and the section of the surface.
-    period : side of the square, m.
-    rms_slope : measured rms slope; None if no study uses the measured slope.
-    repeated : description of a height that many points of a scan share (`repeated_height`).
+    Period, slope and repeated height are those of `Topography`; `section` is the section of the surface.
     """
     if repeated:
         expected = "different heights, and nan in the file where a point is missing"

@@ -19,6 +19,7 @@ from icha.configuration.yaml_files import Source
 from icha.support.checksums import sha256_of
 from icha.support.usual import IchaWarning
 from icha.support.values import NOTHING, Problem
+from icha.surfaces.measured.settings import UnfitTopography
 
 if TYPE_CHECKING:
     from icha.surfaces.measured.topography import PreparedTopography
@@ -98,10 +99,7 @@ def read_topography(section: MeasuredSurface) -> PreparedTopography:
 
 
 def read_surface(section: MeasuredSurface | FileSurface | SpectrumSurface) -> Surface:
-    """Read a surface from a file, and prepare it with the keys of its section; of a spectrum, the realisation 1.
-
-    A ValueError about the shape has the attribute `key`.
-    """
+    """Read a surface from a file, and prepare it with the keys of its section; of a spectrum, the realisation 1."""
     # The modules below import SciPy, which takes time; campaigns without surfaces from files do not need SciPy.
     from icha.surfaces.measured.scan import read_height_map
     from icha.surfaces.surface import Surface
@@ -126,13 +124,11 @@ def _spectrum(section: SpectrumSurface) -> TabulatedSpectrum:
 
 
 def _in_place(surface, section):
-    """Return a surface with the boundary and the shape of its section; raise ValueError if the shape does not fit."""
+    """Return a surface with the boundary and shape of its section; raise UnfitTopography if the shape does not fit."""
     if section.shape is None:
         return surface if surface.free == section.free else replace(surface, boundary="free")
     if problem := section.shape.problem(surface.period, surface.grid):
-        error = ValueError(problem.removeprefix("shape: "))
-        error.key = "shape"
-        raise error
+        raise UnfitTopography(problem.removeprefix("shape: "), "shape")
     return replace(surface, boundary="free", shape=section.shape.shape)
 
 
@@ -160,7 +156,6 @@ def read_scan(path: str | os.PathLike, *, confirmed: Collection[str] = (), **key
     """
     from icha.configuration.plausibility import plausibility_problems, unusual_topography, unusual_values
     from icha.surfaces.measured.defects import repeated_height
-    from icha.surfaces.measured.settings import UnfitTopography
     from icha.surfaces.measured.topography import defects_of
     from icha.surfaces.surface import MISFIT_OF_EDGES, edges_fit
 
@@ -177,10 +172,7 @@ def read_scan(path: str | os.PathLike, *, confirmed: Collection[str] = (), **key
         surface = _in_place(topography.surface, measured)
     except ValidationError as error:
         problems = [{**details, "loc": ("surfaces", "scan", "measured", *details["loc"])} for details in error.errors()]
-        refuse(
-            source,
-            [(location[2:], value, reason) for location, value, reason in map(problem_of, problems)],
-        )
+        refuse(source, [(location[2:], *others) for location, *others in map(problem_of, problems)])
     except UnfitTopography as error:
         refuse(source, [((error.key,), section.get(error.key, NOTHING), str(error))])
     repeated = repeated_height(topography.square.heights)

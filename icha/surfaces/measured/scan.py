@@ -145,10 +145,7 @@ def _missing(key, value):
 def read_height_map(path: str | Path, metres_per_unit: float) -> np.ndarray:
     """Read the heights (m) of a surface of kind `file`: (ny, nx) array; raise UnfitTopography if there are no heights.
 
-    Parameters
-    ----------
-    path : a `.npy` file, or a netCDF file with a variable `height`.
-    metres_per_unit : unit of the heights in the file, m.
+    The file is a `.npy` file, or a netCDF file with a variable `height`.
     """
     path = Path(path)
     kind, data = ("netcdf", "height") if path.suffix == ".nc" else ("npy", None)

@@ -73,17 +73,9 @@ class PreparedTopography:
 
 
 def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> PreparedTopography:
-    """Read a topography from a file and prepare a surface with the given settings.
+    """Read a topography from a file and prepare a surface; `preparation` contains the arguments of `Preparation`.
 
-    Parameters
-    ----------
-    path : path of the file.
-    preparation : arguments of `Preparation`, as `MeasuredSurface.preparation` returns them.
-
-    Raises
-    ------
-    UnfitTopography
-        If the file or a setting does not fit. The attribute `key` names the setting.
+    Raises UnfitTopography if the file or a setting does not fit.
     """
     file, settings = Path(path), Preparation(**preparation)
     scan = load_scan(file, settings)
