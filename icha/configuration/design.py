@@ -44,18 +44,10 @@ _Located = tuple[tuple, Any]
 
 
 def expand_design(campaign: Campaign, content: Mapping, folders: Folders) -> tuple[Campaign, list[Problem]]:
-    """Return the campaign with all runs of every study.
+    """Return the campaign with all runs of every study, and the problems that prevented the expansion.
 
-    Parameters
-    ----------
-    campaign : the campaign as written in the configuration file.
-    content : the configuration as nested mappings; variants of surfaces and materials are made from this content.
-    folders : context of the validation.
-
-    Returns
-    -------
-    The expanded campaign, and the problems that prevented the expansion. `Campaign.with_topographies` later replaces
-    `measured` slopes by numbers.
+    Variants of surfaces and materials are made from `content`, the configuration as nested mappings, and validated with
+    the context `folders`. `Campaign.with_topographies` later replaces `measured` slopes by numbers.
     """
     problems = itertools.chain.from_iterable(
         _study_problems(campaign, label, study) for label, study in campaign.studies.items()
