@@ -4,16 +4,16 @@ Each study is one group with arrays along the labels of its runs. ICHA reads all
 the labels, and fills the arrays of a study one after the other. `docs/howto/dataset.md` describes the dataset.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 import os
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+import h5py
 import numpy as np
 import xarray as xr
+from h5py import h5d, h5s
 
 from icha.datasets.attributes import COLLECTED, combine_attributes
 from icha.datasets.build import describe_variables
@@ -105,9 +105,6 @@ def _read_values(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[s
     ValueError
         If the file cannot be read or is not a run dataset.
     """
-    import h5py  # imported here because the import is slow, and most callers do not read runs
-    from h5py import h5d, h5s
-
     with readable(path), h5py.File(path) as file:
         check_is_run(file, path)
         values = {}

@@ -1,19 +1,13 @@
 """Tidy table of a campaign: one row for each run and target, one column for each label and quantity."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
+import pandas as pd
+import xarray as xr
 
 from icha.datasets.campaign import runs_of_status, variables_of_run
 from icha.datasets.labels import LABELS, place_of
 from icha.datasets.variables.campaign import COMPUTED_RUNS, STATUS_MEANINGS
 from icha.path.targets import BETWEEN
-
-if TYPE_CHECKING:
-    import pandas as pd
-    import xarray as xr
 
 # Ends of the names of columns, by unit.
 _ENDINGS = {
@@ -48,15 +42,11 @@ def tidy_table(campaign: xr.DataTree) -> pd.DataFrame:
     The columns are: study and labels of the run; varied parameters; status of the run; number, branch and target of the
     step; all quantities of the step; all quantities of the run. Names of columns end in the unit, if the unit is not 1.
     """
-    import pandas as pd
-
     return pd.concat([_study_table(campaign, name) for name in campaign.children], ignore_index=True)
 
 
 def _study_table(campaign, name):
     """Return the table of one study."""
-    import pandas as pd
-
     study = campaign[name].to_dataset()
     status = study["status"].transpose(*LABELS).values
     frames = []

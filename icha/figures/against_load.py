@@ -1,13 +1,16 @@
 """Figures of all runs of a study against load: area and separation (2), area and measurements (5), stiffness (7)."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
 
+from icha.analysis import common_loads
+from icha.analysis.common_loads import at_common_loads, interpolate
+from icha.datasets.campaign import reduced_gap, unit_height
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of, quantity
 from icha.figures import curves
@@ -18,12 +21,8 @@ from icha.figures.ensembles import draw_members
 from icha.figures.looks import ASPERITIES_NAME, MODEL_MARKERS, REFERENCE_NAME, TRUTH_LINE, model_handle, surface_label
 from icha.figures.select import NothingToDraw, has_shape
 from icha.figures.style import BLACK, DASHES, GREY, in_style, logarithmic_axes, new_panels
+from icha.references.bare_runs import ciavarella_states
 from icha.support.tables import read_columns
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.figure import Figure
-
 
 _BLACK = {"color": BLACK, "lw": 1, "zorder": 2}
 
@@ -241,8 +240,6 @@ def _difference(line, truth, panel):
     Loads are those of the curve in the load range of boundary elements, and the largest load that both reach. Values of
     both models are interpolated to these loads.
     """
-    from icha.analysis.common_loads import at_common_loads, interpolate
-
     members, runs, truths = [], line.stops, truth.stops
     for seed in [seed for seed in runs if seed in truths]:
         (load, values), (true_load, true_values) = _pressed(panel, runs[seed]), _pressed(panel, truths[seed])
@@ -268,8 +265,6 @@ def _pressed(panel, run):
 
 def _draw_estimates(axes, shown, compared):
     """Draw the difference between Ciavarella's estimate from boundary elements without adhesion, and those with it."""
-    from icha.analysis import common_loads
-
     bare = {truth.runs.contact[1:]: truth.runs.by_seed for _, truth in compared if not truth.runs.surface_energy}
     single = sum(truth.runs.surface_energy > 0 for _, truth in compared) == 1
     for line, truth in compared:
@@ -295,9 +290,6 @@ def _draw_estimates(axes, shown, compared):
 
 def _estimate(bare, adhesive):
     """Return the states of Ciavarella's estimate; None for few states."""
-    from icha.datasets.campaign import reduced_gap, unit_height
-    from icha.references.bare_runs import ciavarella_states
-
     loading, height = bare["leg"].values == 0, float(unit_height(bare))
     loads = (bare["nominal_pressure"] / bare["contact_modulus"]).values[loading]
     areas, gaps = bare["contact_area_fraction"].values[loading], reduced_gap(bare).values[loading]

@@ -1,16 +1,23 @@
 """Figures of results against a parameter: Tabor parameter (9), slope and load (14), area (15), roughness (19)."""
 
-from __future__ import annotations
-
 import itertools
 import os
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from matplotlib.ticker import LogLocator
+from scipy.stats import linregress
 
+from icha.analysis.model_error import state_of
+from icha.asperity.material import WU_HOLDS_FROM
+from icha.asperity.tabor import sphere_pull_off_factor
 from icha.contact.attraction import FINITE_RANGE, SHORT_RANGE
 from icha.contact.models import MODELS, REFERENCE_MODEL
+from icha.datasets.campaign import find_snapshot
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import LOSS_PARTS, label_of
 from icha.figures.captions import (
@@ -57,11 +64,6 @@ from icha.figures.style import (
 )
 from icha.support.formatting import choose_unit
 
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.figure import Figure
-
-
 # --- figure 9 ---
 
 # The axis of the Tabor parameter is logarithmic if the ratio of its largest to its smallest value exceeds this number.
@@ -78,9 +80,6 @@ def tabor(campaign: xr.DataTree, *, study: str, kind: str | None = None, target:
 
     For smooth spheres that are pulled off, draw the pull-off force and the loss instead.
     """
-    from icha.analysis.model_error import state_of
-    from icha.datasets.campaign import find_snapshot
-
     runs = select_runs(campaign, study, ragged=False)
     if all(float(run.get("pull_off_force_over_jkr", 0)) and run["short_wavelength"] == np.inf for _, run in runs):
         return _pull_off_of_spheres([run for _, run in runs])
@@ -140,8 +139,6 @@ def tabor(campaign: xr.DataTree, *, study: str, kind: str | None = None, target:
 
 def _shade_unverified(ax, smallest):
     """Shade the range of Tabor parameters without verified jump into contact, and widen the y axis."""
-    from icha.asperity.material import WU_HOLDS_FROM
-
     low, high = ax.get_xlim()
     # The tolerance allows for a range of attraction that was rounded.
     if smallest < WU_HOLDS_FROM / 1.01:
@@ -154,8 +151,6 @@ def _shade_unverified(ax, smallest):
 
 def _pull_off_of_spheres(runs):
     """Draw pull-off force and loss of smooth spheres against the Tabor parameter, with the limits of JKR and DMT."""
-    from icha.asperity.tabor import sphere_pull_off_factor
-
     runs = sorted(runs, key=lambda run: float(run["tabor_parameter"]))
     at, pull_off, loss = np.array([_values_of_sphere(run) for run in runs]).T
     resolved = np.array([run.attrs.get("attraction") == FINITE_RANGE for run in runs])
@@ -294,8 +289,6 @@ def _models_of(points):
 
 def _scale_pull_off(ax, values):
     """Set a linear y axis; if values span much, a logarithmic axis, which is linear near zero if there are zeros."""
-    from matplotlib.ticker import LogLocator
-
     positive = drop_rounding_errors(values)
     zeros = len(positive) < np.isfinite(values).sum()
     if len(positive) and not zeros and positive.max() > _SPAN * positive.min():
@@ -368,8 +361,6 @@ the loss."""
 @in_style
 def loss(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
     """Draw the loss of runs with adhesion (mean over the seeds), and the parts of this loss by cause."""
-    from matplotlib.patches import Patch
-
     studies = list(dict.fromkeys(studies))
     runs = select_detached_lines(campaign, studies, quantity="hysteresis_loss", both_models=True)
     runs = {key: line for key, line in runs.items() if line[0].surface_energy > 0}
@@ -463,8 +454,6 @@ def fit_line(x: np.ndarray, y: np.ndarray, along: np.ndarray) -> tuple[np.ndarra
     Values of the line at `along`; coefficient of determination; exponent of a power law through the same points. The
     exponent is NaN if a value of y is not positive.
     """
-    from scipy.stats import linregress
-
     line = linregress(x, y)
     exponent = linregress(np.log(x), np.log(y)).slope if np.all(y > 0) else np.nan
     return line.intercept + line.slope * along, line.rvalue**2, exponent

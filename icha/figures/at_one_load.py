@@ -1,14 +1,15 @@
 """Figures of one load, for every material of a study: distributions of gap and pressure (3), sizes of patches (8)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from operator import itemgetter
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
 
+from icha.analysis.model_error import state_of
 from icha.contact.attraction import FINITE_RANGE
+from icha.datasets.campaign import spots_of
 from icha.datasets.labels import slopes_of
 from icha.figures.captions import attractions_of, range_of_attraction, theories_of_flat_surfaces
 from icha.figures.curves import drop_rounding_errors, topographies
@@ -25,12 +26,9 @@ from icha.figures.looks import (
 )
 from icha.figures.select import NothingToDraw, has_layer, has_shape, select_snapshots, snapshot_label
 from icha.figures.style import BLACK, GREY, TWO_COLUMNS, in_style, logarithmic_axes, new_panels, slope_label
+from icha.references.persson import persson_pressure_density
 from icha.support.formatting import choose_unit
 from icha.uncertainty.ensembles import ENOUGH
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.figure import Figure
 
 
 def _begin(campaign, study, lines):
@@ -157,9 +155,6 @@ def distributions(campaign: xr.DataTree, *, study: str, kind: str | None = None,
 
 def _draw_persson(ax, highest, lines, each_look):
     """Draw Persson's theory up to the pressure `highest`, once for each load of the runs on a flat half-space."""
-    from icha.analysis.model_error import state_of
-    from icha.references.persson import persson_pressure_density
-
     drawn, p = [], np.linspace(0.002, highest, 300)
     flat = [not (has_shape(line.members[0][0]) or has_layer(line.members[0][0])) for line in lines]
     for line, look, _ in filter(itemgetter(2), zip(lines, each_look, flat, strict=True)):
@@ -298,8 +293,6 @@ def patch_sizes(campaign: xr.DataTree, *, study: str, kind: str | None = None, t
 
 def patch_areas(run: xr.Dataset, snapshot: int) -> np.ndarray:
     """Return the areas in m² of the contact patches of one snapshot, in ascending order; zero areas are left out."""
-    from icha.datasets.campaign import spots_of
-
     area = np.sort(np.pi * spots_of(run, snapshot)["spot_radius"].values ** 2)
     return area[area > 0]
 

@@ -1,17 +1,17 @@
 """Sentences that captions of several figures have, and sentences that count missing runs and pale runs."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+
+import xarray as xr
+from matplotlib.figure import Figure
 
 from icha.contact.attraction import FINITE_RANGE, SHORT_RANGE
+from icha.datasets.variables.campaign import LOADED_RUNS
 from icha.figures.select import has_layer, has_shape, lacks_fit, lacks_sphere
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.figure import Figure
+from icha.uncertainty.grid_error import cells_of_loops, describe_loops
+from icha.uncertainty.left_out import absent_materials, left_out_of_study
+from icha.uncertainty.sensitivity import left_out_of_samples
 
 _RANGES = {
     (SHORT_RANGE,): "Boundary elements are in the limit of a short range of attraction.",
@@ -74,8 +74,6 @@ def only_spheres(study: xr.Dataset) -> str:
 
 def grid_of_loops(campaign: xr.DataTree, studies: Sequence[str]) -> str:
     """Return a sentence on the error of loops by boundary elements due to the grid; "" without such loops."""
-    from icha.uncertainty.grid_error import cells_of_loops, describe_loops
-
     loops = cells_of_loops(campaign, studies)
     return f"Grid: {describe_loops(loops)}." if loops else ""
 
@@ -92,10 +90,6 @@ def count_runs(
     models : names of the models that the figure shows; empty if they are not known.
     of_loss : True if the figure shows losses, which runs that failed checks of their loss do not have.
     """
-    from icha.datasets.variables.campaign import LOADED_RUNS
-    from icha.uncertainty.left_out import absent_materials, left_out_of_study
-    from icha.uncertainty.sensitivity import left_out_of_samples
-
     found: list[str] = []
     for name in studies:
         if name in getattr(data.get("sensitivity"), "children", ()):

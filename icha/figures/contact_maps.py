@@ -1,14 +1,19 @@
 """Figures that are maps of one topography: contact spots (4, 6), jumps of spots (16), contact pressure (20)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
+from matplotlib.collections import PatchCollection
+from matplotlib.colors import LinearSegmentedColormap, TwoSlopeNorm, to_rgb
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch, Rectangle, Wedge
+from matplotlib.ticker import MaxNLocator
 
+from icha.analysis.model_error import contact_of_spots, jaccard, snapshot_if_any, state_of
 from icha.contact.model import EVENT_KINDS
 from icha.contact.models import REFERENCE_MODEL
+from icha.datasets.campaign import find_snapshot, unit_height
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of
 from icha.figures.captions import attractions_of, grid_of_loops, range_of_attraction
@@ -55,10 +60,6 @@ from icha.figures.style import (
 )
 from icha.support.formatting import choose_unit, format_quantity
 
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.figure import Figure
-
 # Colour of spots, and of events that break or separate spots.
 _RED = (0.9, 0.0, 0.05)
 
@@ -103,11 +104,6 @@ def contact_map(
     run : labels of the run.
     kind, target : kind and target of the snapshot; None for the first snapshot.
     """
-    from matplotlib.patches import Rectangle
-
-    from icha.analysis.model_error import contact_of_spots, snapshot_if_any, state_of
-    from icha.datasets.campaign import find_snapshot
-
     labels = RunLabels(*run)
     data = select_complete_run(campaign, labels)
     at = find_snapshot(data, kind, target)
@@ -171,11 +167,6 @@ def _view(circles, topography):
 
 def _draw_boundary_elements(panels, topography, window, heights, beside, covered):
     """Draw the contact regions of boundary elements, the edges of these regions in the window, and the overlap."""
-    from matplotlib.colors import LinearSegmentedColormap, to_rgb
-    from matplotlib.patches import Patch
-
-    from icha.analysis.model_error import jaccard
-
     (_, solution), (enlarged, compared) = panels
     fraction = beside["contact_map"].transpose("row", "column").values.astype(float)
     contact = fraction >= 0.5
@@ -226,8 +217,6 @@ def spots_by_slope(
     material: str | None = None,
 ) -> Figure:
     """Draw the spots of all slopes for one surface, seed and material; the defaults are those of the first run."""
-    from matplotlib.patches import Patch
-
     runs = select_by_labels(select_runs(campaign, study), surface=surface, seed=seed, material=material)
     by_slope = {labels.rms_slope: run for labels, run in runs}
     names = {labels.rms_slope: Name("spots", labels) for labels, _ in runs}
@@ -260,12 +249,6 @@ def spots_by_slope(
 
 def _draw_slopes(ax, runs, names, kind, colours, length):
     """Draw the spots of each slope at the first snapshot of a kind; `runs` and `names` are by slope."""
-    from matplotlib.collections import PatchCollection
-    from matplotlib.patches import Wedge
-
-    from icha.analysis.model_error import state_of
-    from icha.datasets.campaign import find_snapshot
-
     at = {slope: find_snapshot(run, kind) for slope, run in runs.items()}
     areas = {slope: float(state_of(run, at[slope])["contact_area_fraction"]) for slope, run in runs.items()}
     # Slopes with less contact area are drawn on top of slopes with more contact area.
@@ -366,8 +349,6 @@ def _draw_places(ax, topography, events):
 
 def _draw_counts(ax, events):
     """Draw the cumulative number of events against the mean separation, by kind of event and branch."""
-    from matplotlib.ticker import MaxNLocator
-
     for name, (words, _, look) in _KINDS.items():
         width = 0.6 if name in ("coalescence", "split") else 1.3
         for branch, dashes in BRANCH_DASHES.items():
@@ -383,8 +364,6 @@ def _draw_counts(ax, events):
 
 def _events(run):
     """Return kind, branch, position (m) and separation u/h_rms of the events in first loading and last unloading."""
-    from icha.datasets.campaign import unit_height
-
     steps = run["event_step"].values.astype(int)
     leg = run["leg"].sel(step=steps).values
     shown = (leg == 0) | (leg == unloading_legs(run)[-1]["leg"].values[-1])
@@ -418,8 +397,6 @@ def pressure_maps(campaign: xr.DataTree, maps: xr.Dataset, *, run: Sequence) -> 
     maps : dataset of the file of the run.
     run : labels of the run.
     """
-    from matplotlib.colors import TwoSlopeNorm
-
     labels = RunLabels(*run)
     select_complete_run(campaign, labels)
     count = maps.sizes.get("snapshot", 0)

@@ -1,12 +1,15 @@
 """Curves of a study against load: means over the seeds, boundary elements, unloading, theories, and a legend."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
+from icha.analysis.common_loads import at_common_loads
 from icha.contact.models import REFERENCE_MODEL
 from icha.datasets.quantities import label_of, quantity
 from icha.figures import select
@@ -24,12 +27,6 @@ from icha.figures.looks import (
 )
 from icha.figures.style import GREY, legend_handle, logarithmic_axes
 from icha.support.formatting import choose_unit
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
 
 _COMMON = """Means are at common loads. Between the computed states of each seed, monotone cubic polynomials of the
 logarithm of the load interpolate."""
@@ -244,8 +241,6 @@ def draw_curves(
 
 def _draw_line(axes, line, panel, count):
     """Draw a single run with markers; for several seeds, draw the mean at common loads and the scatter."""
-    from icha.analysis.common_loads import at_common_loads
-
     members, asked = [panel.points(run) for run in line.stops.values()], line.runs.asked
     if len(members) > 1:
         load, values = at_common_loads(members, logarithmic=True)
@@ -264,8 +259,6 @@ def _draw_line(axes, line, panel, count):
 
 def _draw_crosses(axes, line, panel):
     """Draw a curve of boundary elements as crosses; for several seeds, draw the mean and bars at common loads."""
-    from icha.analysis.common_loads import at_common_loads
-
     load, values = at_common_loads([panel.points(run) for run in line.stops.values()], logarithmic=True)
     draw_points(axes, load, values, line.look, positive=True, name=line.runs.drawn_name, asked=line.runs.asked)
     say(axes, _COMMON if len(values) > 1 else "")

@@ -4,22 +4,18 @@ Functions that draw something also say so in the caption, and record its data. T
 the columns `COLUMNS`; columns without any value are left out.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from icha.datasets.labels import LABELS, RunLabels
 from icha.datasets.quantities import plain
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
 
 _RUN = "label of the run; empty if the curve shows several runs"
 # Meaning and unit of each column; "x" and "y" stand for the units in `x_quantity` and `y_quantity`.
@@ -94,8 +90,6 @@ def scatter_handles(figure: Figure) -> dict[str, Artist]:
 
 def table_of(figure: Figure) -> pd.DataFrame:
     """Return the recorded points of a figure; points that are not finite are left out."""
-    import pandas as pd
-
     frames = []
     for axes, columns in getattr(figure, "recorded", []):
         frame = pd.DataFrame(columns, index=range(len(columns["x"])))

@@ -3,13 +3,12 @@
 What draws a mean also explains it in the caption and names its scatter for the legend.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.container import ErrorbarContainer
 
 from icha.datasets.labels import RunLabels
 from icha.figures.drawn import Name, count_seeds, record, say
@@ -18,10 +17,6 @@ from icha.figures.select import ContactRuns
 from icha.figures.style import GREY, legend_handle
 from icha.uncertainty.ensembles import ENOUGH, ensemble
 from icha.uncertainty.left_out import too_few
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.container import ErrorbarContainer
 
 # Largest number of curves whose single seeds are drawn; with more curves, only the means could be told apart.
 MOST_SCATTERED = 4

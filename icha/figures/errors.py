@@ -1,11 +1,10 @@
 """Figures of errors of the asperity model against load: area and separation (10), distributions and maps (11)."""
 
-from __future__ import annotations
-
 import itertools
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
 
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of
@@ -15,10 +14,6 @@ from icha.figures.ensembles import draw_points
 from icha.figures.looks import Contact, Looks, legend_below
 from icha.figures.select import NothingToDraw, compared_seeds, select_errors
 from icha.figures.style import in_style, logarithmic_axes, new_panels
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.figure import Figure
 
 # All materials share a panel if each material has at most this number of lines.
 _MOST_LINES = 2

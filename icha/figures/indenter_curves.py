@@ -1,25 +1,21 @@
 """Runs of indenters for figures: series of runs, and curves of Hertz and JKR."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, NamedTuple
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
 
 from icha.contact.models import REFERENCE_MODEL
 from icha.figures import select
 from icha.figures.drawn import say
 from icha.figures.looks import distinct_colours, graded_colours
 from icha.figures.style import BLACK
+from icha.references.indentation import sphere_contact, sphere_jump_off
 from icha.support.formatting import format_quantity
 from icha.support.tables import read_columns
-
-if TYPE_CHECKING:
-    import os
-    from collections.abc import Iterable, Mapping, Sequence
-
-    import xarray as xr
-    from matplotlib.figure import Figure
 
 # Look of measured points; measurements differ in their marker.
 MEASURED = {"ls": "none", "ms": 3.6, "mew": 0.8, "color": BLACK, "zorder": 5}
@@ -110,8 +106,6 @@ def sphere_of(run: xr.Dataset) -> tuple[float, float, float] | None:
 
 def theory_curves(run: xr.Dataset, largest_radius: float) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Return indentation (m) and force (N) of a smooth sphere up to a contact radius, by name of the theory."""
-    from icha.references.indentation import sphere_contact, sphere_jump_off
-
     sphere = sphere_of(run)
     if sphere is None:
         return {}

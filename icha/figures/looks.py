@@ -6,13 +6,16 @@ surfaces and slopes. If there are many materials, or many surfaces and slopes, c
 bright, and the legend names only some of the lines.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
+import matplotlib as mpl
 import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.colors import to_hex, to_rgb
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from icha.contact.models import DEFAULT_MODEL, MODELS, REFERENCE_MODEL
 from icha.datasets.labels import RunLabels, slopes_of
@@ -21,12 +24,6 @@ from icha.figures.drawn import scatter_handles
 from icha.figures.select import FINITE_RANGE_NAME
 from icha.figures.style import BLACK, COLOURS, GREY, INTERFACE, legend_handle, material_label, slope_label
 from icha.support.formatting import format_quantity
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
 
 # A contact: material, surface and rms slope of a line. The slope is None if slopes are not distinguished.
 Contact = tuple[str, str, float | None]
@@ -96,8 +93,6 @@ class Looks:
         only_drawn: bool = False,
     ):
         """Assign colours and markers to the lines."""
-        import xarray as xr
-
         self._campaign = campaign
         self.contacts = list(dict.fromkeys(contacts))
         interfaces = xr.concat([campaign[study].to_dataset()[INTERFACE] for study in studies], "material")
@@ -287,8 +282,6 @@ def material_colours(campaign: xr.DataTree) -> dict[str, str]:
 
 def pale(look: dict, model: str) -> dict:
     """Return a look in a lighter colour, for runs to which a model is not applicable; open markers stay open."""
-    from matplotlib.colors import to_hex, to_rgb
-
     colour = to_hex([1 - _PALENESS * (1 - part) for part in to_rgb(look["color"])])
     label = COARSE_GRID if model == REFERENCE_MODEL else NOT_APPLICABLE
     filling = {"mfc": colour} if look.get("mfc") == look["color"] else {}
@@ -297,9 +290,6 @@ def pale(look: dict, model: str) -> dict:
 
 def graded_colours(count: int, name: str = "viridis", brightest: float = 0.9) -> list[str]:
     """Return `count` colours of a colour map from dark (0) to `brightest` (at most 1), as hexadecimal text."""
-    import matplotlib as mpl
-    from matplotlib.colors import to_hex
-
     return [to_hex(colour) for colour in mpl.colormaps[name](np.linspace(0, brightest, count))]
 
 

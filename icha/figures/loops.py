@@ -1,13 +1,15 @@
 """Figures of loading and unloading: loops of rough contact (13), force of indenters (17), straight line of JKR (18)."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
+from icha.analysis.model_error import difference_of_contacts
 from icha.contact.model import EVENT_KINDS
 from icha.contact.models import MODELS, REFERENCE_MODEL
 from icha.datasets.labels import RunLabels
@@ -43,11 +45,8 @@ from icha.figures.style import (
     new_panels,
     slope_label,
 )
+from icha.references.indenter_runs import BRANCHES, reason_without_fit, spaced_states, steps_of
 from icha.support.formatting import choose_unit, format_quantity
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.figure import Figure
 
 # --- figure 13 ---
 
@@ -108,10 +107,6 @@ def loops(
     surface, seed : labels of the topography. Default: surface and seed of the first complete run.
     units : "reduced" or "physical".
     """
-    from matplotlib.ticker import MaxNLocator
-
-    from icha.analysis.model_error import difference_of_contacts
-
     runs = select.select_by_labels(select.select_unloaded_runs(campaign, study), surface=surface, seed=seed)
     others = select.select_runs(campaign, boundary_elements or study, ragged=False, model=REFERENCE_MODEL)
     shown = {labels for labels, _ in runs}
@@ -396,8 +391,6 @@ def jkr_plot(
     Tables and measurements (`icha.figures.indenter_curves.read_measured`) with forces and contact radii are shown too.
     The largest force is the end of loading, and R is that of the runs.
     """
-    from icha.references.indenter_runs import BRANCHES, spaced_states, steps_of
-
     series = select_series(campaign, study, only_jkr=True)
     drawn = []
     for each in series:
@@ -443,8 +436,6 @@ def jkr_plot(
 
 def _works(series):
     """Return the mean fitted works of adhesion of a series as text, or why there are none."""
-    from icha.references.indenter_runs import reason_without_fit
-
     words, runs = [], list(series.runs.by_seed.values())
     for branch, (title, _) in _TITLES.items():
         name = f"work_of_adhesion_{branch}"

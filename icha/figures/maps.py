@@ -1,18 +1,16 @@
 """Draw maps of a surface, and contact spots as circles of true size."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.collections import EllipseCollection
+from matplotlib.image import AxesImage
 
+from icha.datasets.campaign import spots_of
 from icha.figures.drawn import Name, record
 from icha.support.formatting import choose_unit
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.image import AxesImage
 
 # Largest number of cells along a side that are distinguishable in a panel.
 _MOST_CELLS = 1024
@@ -100,8 +98,6 @@ def wrap_circles(x, y, radius, period: float, boundary: str) -> np.ndarray:
 
 def spot_circles(run: xr.Dataset, snapshot: int, length: float) -> np.ndarray:
     """Return the spots of a snapshot as circles (`wrap_circles`); `length` converts metres to the unit of the axes."""
-    from icha.datasets.campaign import spots_of
-
     spots = spots_of(run, snapshot)
     x, y, radius = (spots[f"spot_{name}"].values * length for name in ("x", "y", "radius"))
     return wrap_circles(x, y, radius, float(run["period"]) * length, str(run["boundary"].values))
@@ -120,8 +116,6 @@ def record_spots(axes: Axes, circles: np.ndarray, side: float, name: Name) -> No
 
 def draw_spots(axes: Axes, circles: np.ndarray, **look) -> None:
     """Draw contact spots as circles; the columns of `circles` are x, y and radius in the unit of the axes."""
-    from matplotlib.collections import EllipseCollection
-
     x, y, radius = circles.T
     look |= {"offsets": np.column_stack([x, y]), "offset_transform": axes.transData, "units": "xy"}
     axes.add_collection(EllipseCollection(2 * radius, 2 * radius, np.zeros(len(radius)), **look))

@@ -1,16 +1,12 @@
 """Figure of one asperity: force and contact radius against approach (1)."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
+from matplotlib.figure import Figure
 
+from icha.asperity.jkr import JKR
+from icha.asperity.material import Material
 from icha.figures.drawn import plot, say
 from icha.figures.style import BLUE, GREY, VERMILLION, in_style, new_panels
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _CAPTION = """Force F (a) and contact radius a (b) against the approach δ, for one asperity by the theory of Johnson,
 Kendall and Roberts (JKR). On loading (solid line), the asperity snaps into contact at point A, where the gap equals
@@ -22,9 +18,6 @@ B is the pull-off point under load control. The dotted line is the unstable bran
 @in_style
 def jkr(*, tabor_parameter: float = 3.0) -> Figure:
     """Draw the JKR law in reduced units: a in (Δγ R²/E*)^(1/3), δ in (Δγ² R/E*²)^(1/3) and F in Δγ R."""
-    from icha.asperity.jkr import JKR
-    from icha.asperity.material import Material
-
     law = JKR(Material(contact_modulus=1.0, surface_energy=1.0, interaction_range=1 / tabor_parameter))
     R, left, right = 1.0, -3.0, 3.2
     jump_in, jump_off = float(law.jump_in_approach(R)), float(law.jump_off_approach(R))

@@ -1,21 +1,17 @@
 """A figure that a Python file of the user draws: its function `draw` receives a study and returns a figure."""
 
-from __future__ import annotations
-
 import contextlib
 import runpy
 import sys
 import traceback
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import xarray as xr
+from matplotlib.figure import Figure
 
 from icha.figures.drawn import record
 from icha.figures.style import in_style
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.figure import Figure
 
 
 @contextlib.contextmanager
@@ -38,8 +34,6 @@ def _importing_from(folder: Path) -> Iterator[None]:
 @in_style
 def own(campaign: xr.DataTree, script: str, *, study: str) -> Figure:
     """Draw a study with the function `draw` of a script, in the style of all figures."""
-    from matplotlib.figure import Figure
-
     try:
         with _importing_from(Path(script).resolve().parent):
             drawn = runpy.run_path(script)["draw"](campaign[study].to_dataset())

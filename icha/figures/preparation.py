@@ -1,19 +1,12 @@
 """Figure of a scan before and after its preparation, for `icha describe --plot`."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
+from matplotlib.figure import Figure
 
 from icha.figures.style import TWO_COLUMNS, in_style, logarithmic_axes, new_figure
 from icha.support.formatting import choose_unit
 from icha.surfaces.moments import radial_power_spectrum
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from icha.surfaces.surface import Surface
+from icha.surfaces.surface import Surface
 
 
 @in_style

@@ -1,22 +1,16 @@
 """The plots that most users draw from one run: area, separation, and contact map. Axes are those of matplotlib."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
+import matplotlib.pyplot as plt
 import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from icha.figures.curves import panel_in_units
 from icha.figures.maps import draw_spots
 from icha.figures.style import BLUE, GREEN, GREY, VERMILLION, in_style, new_panels
+from icha.references.jkr_test import JKRTest
 from icha.support.formatting import choose_unit
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from icha.references.jkr_test import JKRTest
 
 # Look of the points of a JKR test by their use; other points are left out.
 _LOOKS: dict[str, dict[str, object]] = {
@@ -112,6 +106,4 @@ def _plot_against_pressure(run, name, axes, look):
 
 
 def _new_axes():
-    import matplotlib.pyplot as plt
-
     return plt.subplots()[1]

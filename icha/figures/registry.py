@@ -3,27 +3,17 @@
 The module `own_figure` draws all figures of the user's own, whose names do not begin in this way. A function receives
 the data and the arguments that the request of the figure names (`icha.configuration.figures`). It raises
 `icha.figures.select.NothingToDraw` if no run in the figure is complete.
-"""
 
-from __future__ import annotations
+Snakemake imports this module whenever it starts. The other modules of this folder, which import Matplotlib and xarray,
+are imported when a figure is drawn.
+"""
 
 import importlib
 import os
-import textwrap
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from icha.datasets.results import figure_number
-from icha.datasets.table import as_csv
-from icha.figures.captions import count_runs, units_of_shapes
-from icha.figures.drawn import caption_of, models_of, say, table_of
-from icha.figures.style import GREY, in_style, new_figure, save
-from icha.support.atomic_files import whole_file
-from icha.support.scripts import caption_in
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 # The module of each function that draws a figure.
 _MODULES = {
@@ -44,7 +34,7 @@ def module_name(name: str) -> str:
     return f"icha.figures.{_MODULES[_function(name)]}"
 
 
-def drawing_function(name: str) -> Callable[..., Figure]:
+def drawing_function(name: str) -> Callable:
     """Return the function that draws a figure."""
     return getattr(importlib.import_module(module_name(name)), _function(name))
 
@@ -66,15 +56,16 @@ def draw_figure(
 ) -> None:
     """Draw a figure and write it to `png` and `pdf`, its caption to the file `text`, and what it draws to `table`.
 
-    If no run in the figure is complete, the figure is a message only.
-
-    Parameters
-    ----------
-    inputs : paths of files.
-    arguments : keyword arguments of the function `figure`.
-    studies : names of the studies whose runs the figure shows.
+    If no run in the figure is complete, the figure is a message only. `inputs` are paths of files, and `arguments`
+    further keyword arguments of the function that draws. `studies` are the studies whose runs the figure shows.
     """
+    from icha.datasets.table import as_csv
+    from icha.figures.captions import count_runs, units_of_shapes
+    from icha.figures.drawn import caption_of, models_of, say, table_of
     from icha.figures.select import NothingToDraw
+    from icha.figures.style import empty_page, save
+    from icha.support.atomic_files import whole_file
+    from icha.support.scripts import caption_in
 
     data = {argument: _read(files) for argument, files in inputs.items()}
     try:
@@ -85,7 +76,7 @@ def draw_figure(
     except NothingToDraw as reason:
         caption = f"Nothing to draw: {reason}."
         print(caption)
-        figure = _empty_page(str(reason))
+        figure = empty_page(str(reason))
     save(figure, png, pdf)
     with whole_file(table) as temporary:
         temporary.write_text(as_csv(table_of(figure)), encoding="utf-8")
@@ -104,10 +95,3 @@ def _read(files):
     if not str(files).endswith(".nc"):
         return files
     return read_campaign(files) if has_groups(files) else read_dataset(files)
-
-
-@in_style
-def _empty_page(reason) -> Figure:
-    figure = new_figure(5.0, 2.5)
-    figure.text(0.5, 0.5, textwrap.fill(reason, 60), ha="center", va="center", color=GREY, parse_math=False)
-    return figure

@@ -1,10 +1,10 @@
 """Figures of sampled cases: share of the variance that each parameter causes (21), and a result against each (22)."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
 
 from icha.contact.models import MODELS
 from icha.datasets import quantities
@@ -14,12 +14,6 @@ from icha.figures.looks import legend_below
 from icha.figures.select import NothingToDraw
 from icha.figures.style import BLUE, GREY, TWO_COLUMNS, VERMILLION, in_style, legend_handle, logarithmic_axes, new_grid
 from icha.support.formatting import choose_unit
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import xarray as xr
-    from matplotlib.figure import Figure
 
 # Thickness of a bar.
 _BAR = 0.36

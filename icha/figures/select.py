@@ -1,25 +1,32 @@
 """Select runs, snapshots and errors for a figure from the datasets of a campaign."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
 
+from icha.analysis.model_error import snapshot_if_any
 from icha.contact.attraction import FINITE_RANGE
 from icha.contact.models import MODELS, REFERENCE_MODEL, first_model, model_of
+from icha.datasets.campaign import (
+    find_snapshot,
+    loading_stops,
+    reduced_gap,
+    run_place,
+    runs_of_status,
+    select_run,
+    unit_height,
+)
 from icha.datasets.labels import LABELS, RunLabels, place_of, surfaces_and_slopes
 from icha.datasets.quantities import quantity
+from icha.datasets.variables.campaign import COMPUTED_RUNS, LOADED_RUNS, MISSING, NOT_IN_DESIGN, RAGGED, WHOLE_RUNS
 from icha.figures.drawn import Name
 from icha.figures.style import format_number
-from icha.path.targets import UNITS, UNLOADING
+from icha.path.targets import LOADS, UNITS, UNLOADING
 from icha.support.formatting import format_quantity
-
-if TYPE_CHECKING:
-    import xarray as xr
-
+from icha.uncertainty.grid_error import LOOP_ERRORS, cells_of_length
 
 # Name of boundary elements at a finite range of attraction in legends; other names are in the records of the models.
 FINITE_RANGE_NAME = "boundary elements at finite range"
@@ -110,11 +117,6 @@ def select_runs(
     NothingToDraw
         If no run of the `shown_model` is complete.
     """
-    import xarray as xr
-
-    from icha.datasets.campaign import reduced_gap, run_place, runs_of_status, select_run
-    from icha.datasets.variables.campaign import LOADED_RUNS, RAGGED
-
     dataset = campaign[study].to_dataset()
     wanted = model or shown_model(dataset)
     found = [labels for labels in runs_of_status(dataset, study, LOADED_RUNS) if labels.model == wanted]
@@ -131,8 +133,6 @@ def select_runs(
 
 def asked_seeds(study: xr.Dataset, labels: RunLabels) -> int:
     """Return the number of seeds that a study requests for the model, surface, slope and material of a run."""
-    from icha.datasets.variables.campaign import COMPUTED_RUNS, MISSING
-
     at = place_of(study, {label: getattr(labels, label) for label in LABELS if label != "seed"})
     return int(np.isin(study["status"].isel(at).values, (*COMPUTED_RUNS, MISSING)).sum())
 
@@ -171,8 +171,6 @@ def is_applicable(run: xr.Dataset) -> bool:
 
 def is_good_loop(run: xr.Dataset, variable: str = "hysteresis_loss") -> bool:
     """Return False if a model is not applicable to a run that unloads, or its grid too coarse for pull-off or loss."""
-    from icha.uncertainty.grid_error import LOOP_ERRORS, cells_of_length
-
     least = LOOP_ERRORS[variable].least_cells
     coarse = run.attrs.get("contact_model") == REFERENCE_MODEL and cells_of_length(run) < least
     return is_applicable(run) and not coarse
@@ -211,9 +209,6 @@ def select_by_labels(
 
 def select_complete_run(campaign: xr.DataTree, labels: RunLabels) -> xr.Dataset:
     """Return a run of the campaign; raise `NothingToDraw` if the run is not complete."""
-    from icha.datasets.campaign import run_place, select_run
-    from icha.datasets.variables.campaign import WHOLE_RUNS
-
     dataset = campaign[labels.study].to_dataset()
     if int(dataset["status"].isel(run_place(dataset, labels))) not in WHOLE_RUNS:
         raise NothingToDraw(f"{labels}: this run is not complete")
@@ -225,9 +220,6 @@ def path_steps(run: xr.Dataset) -> xr.Dataset:
 
     Steps at zero load are left out: their load is only an error of the solver.
     """
-    from icha.datasets.campaign import loading_stops
-    from icha.path.targets import LOADS
-
     run = run.isel(step=loading_stops(run).values)
     kinds = [str(kind) for kind in run["step_kind"].values]
     main = max(dict.fromkeys(kinds), key=kinds.count, default=None)
@@ -273,9 +265,6 @@ def select_snapshots(
     campaign: xr.DataTree, study: str, kind: str | None = None, target: float | None = None
 ) -> list[Snapshots]:
     """Return the same snapshot of every run on the first surface and slope of a study, for the `shown_model`."""
-    from icha.analysis.model_error import snapshot_if_any
-    from icha.datasets.campaign import find_snapshot
-
     groups = group_by_contact(campaign, select_runs(campaign, study))
     alone = groups[0].labels.model == REFERENCE_MODEL
     reference = [] if alone else group_by_contact(campaign, select_runs(campaign, study, model=REFERENCE_MODEL))
@@ -323,8 +312,6 @@ def select_errors(model_error: xr.DataTree, study: str) -> Iterator[tuple[tuple[
 
 def compared_seeds(errors: xr.Dataset) -> int:
     """Return the number of seeds that a comparison requests; `errors` is one dataset of `select_errors`."""
-    from icha.datasets.variables.campaign import NOT_IN_DESIGN
-
     return int((errors["status"] != NOT_IN_DESIGN).sum("seed"))
 
 
@@ -355,8 +342,6 @@ def select_unloaded_runs(
 
 def over_mean_separation(run: xr.Dataset) -> xr.Dataset:
     """Return a run whose reduced separation is the mean separation divided by the rms height, also on a free square."""
-    from icha.datasets.campaign import unit_height
-
     return run.assign(reduced_separation=run["mean_separation"] / unit_height(run))
 
 

@@ -1,26 +1,21 @@
-"""Style, labels and units of all figures. The same data always give figure files with the same bytes.
-
-Matplotlib is imported only inside functions that draw, so that ICHA reads a configuration quickly.
-"""
-
-from __future__ import annotations
+"""Style, labels and units of all figures. The same data always give figure files with the same bytes."""
 
 import os
+import textwrap
 from contextlib import contextmanager
 from functools import partial
 from string import ascii_lowercase
-from typing import TYPE_CHECKING
 
+import matplotlib as mpl
 import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from icha.support.atomic_files import whole_file
 from icha.support.formatting import choose_unit, format_quantity
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
 
 # Widths of one and of two columns of a journal page, inches.
 ONE_COLUMN = 3.5
@@ -65,8 +60,6 @@ RC = {
 @contextmanager
 def _style():
     """Set the style `RC` for all drawing inside the context; matplotlib settings of the user have no effect."""
-    import matplotlib as mpl
-
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(RC)
@@ -79,9 +72,6 @@ in_style = _style()
 
 def new_figure(width: float, height: float) -> Figure:
     """Return an empty figure without a window and without pyplot's global state; width and height are in inches."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     figure = Figure(figsize=(width, height), layout="constrained")
     figure.get_layout_engine().set(w_pad=0.05, h_pad=0.06)
     FigureCanvasAgg(figure)
@@ -129,6 +119,14 @@ def new_grid(
     return figure, panels, columns
 
 
+@in_style
+def empty_page(reason: str) -> Figure:
+    """Return a figure that only states why there is nothing to draw."""
+    figure = new_figure(5.0, 2.5)
+    figure.text(0.5, 0.5, textwrap.fill(reason, 60), ha="center", va="center", color=GREY, parse_math=False)
+    return figure
+
+
 def save(figure: Figure, png: str | os.PathLike, pdf: str | os.PathLike) -> None:
     """Write a figure as PNG and as PDF, without the date and the name of the software."""
     with _style():
@@ -160,8 +158,6 @@ def _minor_label(axis, value, _):
 
 def legend_handle(x=(), y=(), **look) -> Line2D:
     """Return a line that is only drawn in a legend; `look` are keyword arguments of `Axes.plot`."""
-    from matplotlib.lines import Line2D
-
     return Line2D(x, y, **look)
 
 
