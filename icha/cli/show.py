@@ -43,7 +43,10 @@ def _dataset(data) -> Iterator[str]:
         yield "as measured, before scaling to another rms slope:"
         yield from _quantities(data[["rms_height", "rms_slope"]].map(lambda values: values * scale, keep_attrs=True))
         yield "as stored:"
-    yield from _quantities(data)
+    # A smooth shape has no roughness, whose height and slope are the reduced units.
+    smooth = "unit_height" in data and not data["rms_height"]
+    reduced = ("reduced_pressure", "reduced_separation", "largest_reduced_pressure") if smooth else ()
+    yield from _quantities(data.drop_vars(reduced, errors="ignore"))
     if "pull_off_force_over_jkr" in data:
         from icha.references.indenter_runs import BRANCHES, reason_without_fit
 

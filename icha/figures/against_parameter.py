@@ -300,7 +300,7 @@ def _scale_pull_off(ax, values):
     if len(positive) and positive.max() > _SPAN_WITH_ZEROS * positive.min():
         least = 10.0 ** np.floor(np.log10(positive.min()))
         ax.set_yscale("symlog", linthresh=least, linscale=0.4)
-        ax.set_ylim(-0.3 * least, 2 * positive.max())
+        ax.set_ylim(-0.3 * least, 2 * ax.dataLim.ymax)  # contains the bars
     elif len(positive):
         ax.set_ylim(bottom=-0.04 * positive.max())
     ax.axhline(0, color=GREY, lw=0.6, zorder=1)

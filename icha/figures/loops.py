@@ -105,7 +105,7 @@ def loops(
     ----------
     campaign : the campaign dataset.
     surface, seed : labels of the topography. Default: surface and seed of the first complete run.
-    units : "reduced" or "physical".
+    units : "reduced" or "physical"; smooth shapes are always in physical units.
     """
     runs = select.select_by_labels(select.select_unloaded_runs(campaign, study), surface=surface, seed=seed)
     others = select.select_runs(campaign, boundary_elements or study, ragged=False, model=REFERENCE_MODEL)
@@ -121,7 +121,8 @@ def loops(
         beside = map(select.over_mean_separation, truths)
         drawn.append(_Loop(labels, run, [each for each in beside if not difference_of_contacts(run, each)], look))
 
-    physical = units == "physical"
+    # A smooth shape has no roughness, whose height and slope are the reduced units.
+    physical = units == "physical" or not any(float(run["rms_height"]) for _, run in runs)
     pressures, areas = _panels(campaign[study].to_dataset(), physical=physical)
     rows = [[slope] for slope in slopes] if own_rows else [slopes]
     by_row = [[loop for loop in drawn if loop.labels.rms_slope in shown] for shown in rows]

@@ -168,6 +168,7 @@ def test_fig14_shows_means_and_scatter_over_the_seeds(tree):
     # Two seeds are too few for a confidence interval: the bars are their range.
     ranges = [segment[:, 1] for segment in sticky[2][0].get_segments()]
     np.testing.assert_allclose(ranges, np.transpose([values.min(axis=0), values.max(axis=0)]))
+    assert left.get_ylim()[1] > values.max()
     assert left.get_title("right") == "asperities"
     assert np.all(bare[0].get_ydata() == 0) and bare[0].get_markerfacecolor() == "white"
 

@@ -141,6 +141,9 @@ def test_states_beyond_jkr_do_not_spoil_the_axes_and_spheres_of_long_range_have_
     write_dataset(run, tmp_path / "run.nc")
     shown = CliRunner().invoke(app, ["show", str(tmp_path / "run.nc")]).output
     assert "work of adhesion on approach: no fit (Tabor parameter 0.3 below 3)" in shown
+    # There are no reduced values of a smooth shape, and values of full contact are those of the roughness.
+    assert "reduced_" not in shown and shown.count("of the roughness alone") == 2
+    assert loops.loops(tree, study="press").axes[0].get_xlabel().startswith(label_of("mean_separation"))
     figure = loops.jkr_plot(tree, study="press")
     lowest = min(line[:, 0].min() for ax in figure.axes for line in lines(ax))
     factor = {"k": 1e-3, "N": 1.0}[figure.axes[0].get_xlabel().split("(")[1][0]]
