@@ -106,10 +106,10 @@ def _answer(row: xr.Dataset) -> Answer:
     causes |= {"model": np.nan_to_num(shares["model"])} if row["asperity_seeds"] else {}
     causes |= {name: shares[name] for name in ("grid", "inputs") if not math.isnan(shares[name])}
     kind = str(row["stop_kind"].item())
-    notes = [str(row["left_out"].item()) if "left_out" in row else ""]  # not in results of earlier versions
+    notes = [str(row["left_out"].item())]
     if row["full_contact_seeds"]:
         notes.append(f"full contact in {int(row['full_contact_seeds'])} of {int(row['fine_seeds'])} seeds")
-    notes.append(str(row["grid_error"].item()) if "grid_error" in row else "")
+    notes.append(str(row["grid_error"].item()))
     return Answer(
         f"{row['material'].item()} on {row['surface'].item()}, h'rms = {float(row['rms_slope']):.4g}",
         "" if kind == LOOP else state_words(kind, float(row["stop_target"])),
