@@ -14,18 +14,9 @@ if TYPE_CHECKING:
 
 
 def build_dataset(table: Table, values: Mapping[str, Any], attrs: Mapping[str, str]) -> xr.Dataset:
-    """Build a dataset from values; variables have the order of the table, and coordinates come last.
+    """Build a dataset from values by name; variables have the order of the table, and coordinates come last.
 
-    Parameters
-    ----------
-    table : descriptions of the variables (`icha.datasets.variables`).
-    values : numbers, texts or arrays, by name of the variable.
-    attrs : global attributes.
-
-    Raises
-    ------
-    ValueError
-        If a value has no description.
+    Raise ValueError if a value has no description in the table.
     """
     import xarray as xr  # imported here because the import is slow, and some callers do not build datasets
 

@@ -99,11 +99,6 @@ def _read_values(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[s
     """Read the values and the global attributes of a run from its file, without maps.
 
     The low-level interface of h5py takes a quarter of the time that xarray takes.
-
-    Raises
-    ------
-    ValueError
-        If the file cannot be read or is not a run dataset.
     """
     with readable(path), h5py.File(path) as file:
         check_is_run(file, path)
@@ -234,13 +229,7 @@ class _Study:
         return tuple(label for label in LABELS if label in {*along, *dims})
 
     def _along_labels(self, name: str) -> xr.Variable:
-        """Return the array of a variable of all runs.
-
-        Raises
-        ------
-        ValueError
-            If runs differ in a value that they must share. The message names the run.
-        """
+        """Return the array of a variable of all runs; raise ValueError if runs differ in a value that they share."""
         along, dims = self._along(name), self.variables[name].dims
         having = [run for run in self.runs if name in run.values]
         shape = [self.sizes[dim] for dim in (*along, *dims)]

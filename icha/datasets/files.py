@@ -128,13 +128,7 @@ def _refuse_values_not_finite(dataset: xr.Dataset, where: str) -> None:
 
 
 def read_dataset(path: str | os.PathLike) -> xr.Dataset:
-    """Read a netCDF file with a single group into memory.
-
-    Raises
-    ------
-    ValueError
-        If the file does not exist or cannot be read.
-    """
+    """Read a netCDF file with a single group into memory; raise ValueError if it cannot be read."""
     with readable(path):
         return xr.load_dataset(path, engine="netcdf4")
 
@@ -172,13 +166,7 @@ def readable(path: str | os.PathLike) -> Iterator[None]:
 
 
 def read_run(path: str | os.PathLike) -> xr.Dataset:
-    """Read the dataset of a run from a file; the dataset equals the result of `icha.simulate`.
-
-    Raises
-    ------
-    ValueError
-        If the file cannot be read or is not a run dataset.
-    """
+    """Read the dataset of a run, which equals the result of `icha.simulate`; raise ValueError for other files."""
     run = read_dataset(path)
     check_is_run(run.variables, path)
     return run

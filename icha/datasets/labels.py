@@ -89,13 +89,8 @@ def number_label(value: float) -> str:
 def arrange_slopes(pairs: Iterable[tuple[str, float]]) -> np.ndarray:
     """Arrange rms slopes in ascending order: in one row if one surface has all slopes, else in one row per surface.
 
-    Parameters
-    ----------
-    pairs : surface and rms slope of every run. Surfaces keep the order in which they first appear.
-
-    Returns
-    -------
-    The slopes in an array of shape (slopes,) or (surfaces, slopes), with NaN after the last slope of a surface.
+    `pairs` are surface and rms slope of every run. Surfaces keep the order in which they first appear. Return an array
+    of shape (slopes,) or (surfaces, slopes), with NaN after the last slope of a surface.
     """
     found: dict[str, set[float]] = {}
     for surface, slope in pairs:
@@ -138,10 +133,7 @@ def labels_at(data: xr.Dataset, place: Sequence[int], labels: Sequence[str]) -> 
 def place_of(data: xr.Dataset, wanted: Mapping[str, Any]) -> dict[str, int]:
     """Return the index of the wanted value along every label; the labels must include `surface`.
 
-    Raises
-    ------
-    KeyError
-        If a label does not have the wanted value; the argument of the error is the name of the label.
+    Raise KeyError with the name of the label if a label does not have the wanted value.
     """
     at: dict[str, int] = {}
     # The slope comes last because slopes may depend on the surface.

@@ -29,14 +29,9 @@ def write_surface(
 ) -> None:
     """Write a topography to a file, with statistics, power spectrum and origin.
 
-    Parameters
-    ----------
-    path : path of the file.
-    surface : the topography. Campaigns scale topographies to rms slope 1.
-    name, seed : labels of the surface in the campaign.
-    spectrum : the `icha.surfaces.spectrum.SelfAffineSpectrum` of a random surface.
-    measured : the `icha.surfaces.measured.topography.PreparedTopography` of a measured surface, before scaling.
-    attrs : further global attributes.
+    Campaigns scale topographies to rms slope 1. A random surface has a `spectrum`
+    (`icha.surfaces.spectrum.SelfAffineSpectrum`); a measured one is `measured`
+    (`icha.surfaces.measured.topography.PreparedTopography`) before scaling.
     """
     n = surface.grid
     nodes = np.arange(n) * surface.spacing
@@ -97,10 +92,7 @@ def measured_scale(surface: xr.Dataset) -> float:
 def read_surface(path: str | os.PathLike) -> Surface:
     """Read the topography of a surface file.
 
-    Raises
-    ------
-    ValueError
-        If the file cannot be read, lacks heights or period, or has heights that are flat, not square or not finite.
+    Raise ValueError if the file cannot be read, lacks heights or period, or has heights that `Surface` refuses.
     """
     dataset = read_dataset(path)
     for name in ("height", "period"):
@@ -125,12 +117,6 @@ def read_scaled_surface(path: str | os.PathLike, rms_slope: float, rms_height: f
 
 
 def read_spectral_moments(path: str | os.PathLike) -> SpectralMoments:
-    """Read the spectral moments from a surface file, without reading the heights.
-
-    Raises
-    ------
-    ValueError
-        If the file cannot be read.
-    """
+    """Read the spectral moments from a surface file, without reading the heights."""
     with readable(path), xr.open_dataset(path, engine="netcdf4") as dataset:
         return SpectralMoments(*(float(dataset[f"spectral_moment_{order}"]) for order in (0, 2, 4)))

@@ -39,17 +39,14 @@ def write_explorer(
 ) -> tuple[int, int]:
     """Write the page for exploring a campaign; return the number of contacts on the page, and of those without steps.
 
+    Raise ValueError if a file cannot be read, a choice does not exist, or the page is too large.
+
     Parameters
     ----------
     folder : folder of the results of the campaign.
     page : HTML file to write.
     only : values to include, by a name in `CHOICES` such as "study"; a missing name stands for all its values.
     largest : largest size of the data of the page, MB.
-
-    Raises
-    ------
-    ValueError
-        If the dataset is missing, a choice in `only` does not exist, the page is too large, or a file cannot be read.
     """
     files = sorted(Path(folder).glob(results.DATASET.format(campaign="*")))
     if len(files) != 1:
@@ -151,14 +148,9 @@ def _numbers(values) -> list[float]:
 
 
 def encode_snapshot(run: xr.Dataset, k: int, file: Path, state: tuple[str, float]) -> dict:
-    """Return the step, the contact and the distributions of a snapshot.
+    """Return the step, the contact and the distributions of snapshot `k` of a run, whose kind and target are `state`.
 
-    Parameters
-    ----------
-    run : dataset of the run.
-    k : number of the snapshot.
-    file : file of the run; only this file contains contact maps of boundary elements.
-    state : kind and target of the snapshot; the order of snapshots in file and campaign dataset may differ.
+    Only the `file` of the run contains contact maps of boundary elements. Its snapshots may have another order.
     """
     step, by_cells = int(run["snapshot_step"].values[k]), MODELS[run.attrs["contact_model"]].by_cells
     densities = gap_densities([(run, k)]), pressure_densities([(run, k)], joined=by_cells)

@@ -82,10 +82,7 @@ def count_runs(study: xr.Dataset) -> Counter[str]:
 def failures(studies: Mapping[str, xr.Dataset], folder: str | None) -> tuple[list[str], Table]:
     """Return sentences that count failed runs, and a table of the runs that means leave out, with the reasons.
 
-    Parameters
-    ----------
-    studies : datasets of the studies, by name.
-    folder : folder of the runs, for links to their files; None for texts without links.
+    The table has links to files of runs if their `folder` is given.
     """
     sentences = [
         f"Study {name}: {words}."

@@ -56,12 +56,7 @@ def statements_on_results(campaign: xr.DataTree, model_error: xr.DataTree | None
 
 
 def measured_errors(model_error: xr.DataTree) -> dict[str, Statement]:
-    """Return a statement for each study whose error is measured, by name of the study.
-
-    Parameters
-    ----------
-    model_error : result of `icha.analysis.model_error.model_error`.
-    """
+    """Return a statement for each study in the dataset `model_error`, by name of the study."""
     found = {}
     for name, node in model_error.children.items():
         errors = node.to_dataset()

@@ -82,17 +82,11 @@ def read_tables(
 
 
 def bin_table(quantity: str, units: str, over: str = "") -> Table:
-    """Describe the variables for the bins of a quantity: edges, centres and bounds.
+    """Describe the variables for the bins of a quantity: edges, centres and bounds, divided by the reference `over`.
 
     `<quantity>_bin_bounds` are the CF bounds (CF 1.11, section 7.1) of the coordinate `<quantity>_bin_centre`. Bounds
     and centres have the same units and long name. The coordinate must not have the name of its dimension, because CF
     would read a coordinate variable in Pa as a height.
-
-    Parameters
-    ----------
-    quantity : name of the quantity.
-    units : unit of the edges.
-    over : name of the reference by which the quantity is divided; "" if it is not divided.
     """
     over = f" divided by {over}" if over else ""
     bins, inside = f"{quantity}_bin", f"{quantity} in the bin{over}"
