@@ -40,13 +40,7 @@ def runs_of_status(study: xr.Dataset, name: str, statuses: Collection[int]) -> l
 
 
 def run_place(study: xr.Dataset, labels: RunLabels) -> dict[str, int]:
-    """Return the index of a run along each label of the dataset of a study.
-
-    Raises
-    ------
-    ValueError
-        If the study does not have the value of a label; the message lists the values in the study.
-    """
+    """Return the index of a run along each label of a study; raise ValueError if the study lacks a value."""
     wanted = {label: getattr(labels, label) for label in LABELS}
     try:
         return place_of(study, wanted)
@@ -119,8 +113,7 @@ def variables_of_run(tree: xr.DataTree, labels: RunLabels | tuple) -> tuple[dict
     if int(status) in STATUS_ATTRIBUTES:
         attrs[STATUS_ATTRIBUTES[int(status)]] = failure.item()
     for name in _TEXTS:
-        if name in study.variables:  # not in campaigns of earlier versions
-            attrs[name] = study.variables[name].transpose(*LABELS)[place].item()
+        attrs[name] = study.variables[name].transpose(*LABELS)[place].item()
     return variables, attrs
 
 
@@ -133,18 +126,13 @@ def _ragged_slice(study: xr.Dataset, dim: str, place: tuple[int, ...]) -> slice:
     return slice(int(begin), int(end))
 
 
-def unit_height(data: xr.Dataset) -> xr.DataArray:
-    """Return the unit of separations, m: `unit_height`, or `rms_height` in datasets of earlier versions."""
-    return data["unit_height" if "unit_height" in data else "rms_height"]
-
-
 def reduced_gap(data: xr.Dataset) -> xr.DataArray:
     """Return the ratio of the mean gap to the unit of heights (rms height); figures show this ratio as the separation.
 
     On a periodic surface, mean gap and mean separation are equal. The mean separation of a free square is the
     distance to the half-space far from the square. Therefore only the mean gap is comparable among all surfaces.
     """
-    gap = (data["mean_gap"] / unit_height(data)).transpose(*data["reduced_separation"].dims)
+    gap = (data["mean_gap"] / data["unit_height"]).transpose(*data["reduced_separation"].dims)
     return data["reduced_separation"].where(data["boundary"] != "free", gap)
 
 
@@ -156,10 +144,7 @@ def loading_stops(data: xr.Dataset) -> xr.DataArray:
 def find_snapshot(run: xr.Dataset, kind: str | None = None, target: float | None = None) -> int:
     """Return the index of the first snapshot with a kind and a target; None means any kind or any target.
 
-    Raises
-    ------
-    ValueError
-        If the run does not have the snapshot; the message lists the snapshots of the run.
+    Raise ValueError if the run does not have the snapshot.
     """
     snapshots = list(zip(run["snapshot_kind"].values.astype(str), run["snapshot_target"].values, strict=True))
     for k, (found, value) in enumerate(snapshots):

@@ -8,9 +8,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from icha.analysis import common_loads
 from icha.analysis.common_loads import at_common_loads, interpolate
-from icha.datasets.campaign import reduced_gap, unit_height
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of, quantity
 from icha.figures import curves
@@ -18,7 +16,7 @@ from icha.figures.captions import theories_of_flat_surfaces
 from icha.figures.curves import Panel, draw_theory, panel_in_units
 from icha.figures.drawn import Name, plot, record, say
 from icha.figures.ensembles import draw_members
-from icha.figures.looks import ASPERITIES_NAME, MODEL_MARKERS, REFERENCE_NAME, TRUTH_LINE, model_handle, surface_label
+from icha.figures.looks import ASPERITIES_NAME, legend_below
 from icha.figures.select import NothingToDraw, has_shape
 from icha.figures.style import BLACK, DASHES, GREY, in_style, logarithmic_axes, new_panels
 from icha.references.bare_runs import ciavarella_states
@@ -36,26 +34,15 @@ _SAME_LOAD = 1e-6
 _SEPARATIONS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5)
 # Look of Ciavarella's estimate from boundary elements without adhesion.
 _ESTIMATE = {"ls": (0, (6, 1.5, 1, 1.5, 1, 1.5)), "lw": 0.9, "zorder": 1.9}
-# What is compared in each lower panel, and the difference that is drawn.
-_COMPARED_IN = (
-    (Panel("reduced_pressure", "contact_area_fraction"), "area_error"),
-    (Panel("reduced_pressure", "reduced_separation"), "separation_error"),
-)
+_AREA_OVER_PRESSURE = Panel("reduced_pressure", "contact_area_fraction")
 
 _COMPARED = """Panels (c) and (d) show the relative difference between asperity model and boundary elements (BEM), of
-each topography at the same load, as a mean over the seeds; thin lines join the symbols, which end at the largest load
-that both models reach."""
-_CIAVARELLA = """Lines with two dots show the estimate of Ciavarella (2018) in place of the asperity model; it follows
-from boundary elements without adhesion, and its loads are not those of the symbols."""
-_PERSSON = "Other lines are theories of contact without adhesion: that of Persson for the area (a)."
-_BUSH = "That of Bush, Gibson and Thomas, also for the area, is grey and dashed."
-_YANG = "That of Yang and Persson for the separation is in (b)."
-_XU = "Xu et al. (2024) correct Persson's theory for the variance of the pressure in partial contact."
-_SUMMITS = {
-    "Greenwood & Williamson": "The theory of Greenwood and Williamson, in (a) and (b), describes separate summits.",
-    "Fuller & Tabor": """Of these theories, only that of Fuller and Tabor, also in (a) and (b) and of separate summits,
-    includes adhesion.""",
-}
+each topography at the same load, as a mean over the seeds. Symbols end at the largest load that both models reach."""
+_CIAVARELLA = """The estimate of Ciavarella (2018) follows from boundary elements without adhesion; its loads are not
+those of the symbols."""
+_THEORIES = """Theories are those of contact without adhesion, except that of Fuller and Tabor. Those of Greenwood and
+Williamson and of Fuller and Tabor are of separate summits. Xu et al. (2024) correct Persson's theory for the variance
+of the pressure in partial contact."""
 _GFMD = """Oblique crosses are published results of Green's function molecular dynamics without adhesion for this
 spectrum (Xu et al., 2024), with standard deviations over surfaces. These areas are counts of cells on a coarse grid; a
 correction for the perimeter would make them up to 7 % smaller."""
@@ -67,39 +54,32 @@ def area_and_gap(
 ) -> Figure:
     """Draw area over load and mean gap of all runs of a study, or in physical units the area and the mean gap.
 
-    Parameters
-    ----------
-    campaign : the campaign dataset.
-    references : theories and published results for the study's first surface (`icha.references.theories`), if flat.
-    units : "reduced" or "physical". In physical units, theories are drawn only if one pressure unit holds for all runs.
+    `references` are theories and published results for the study's first surface (`icha.references.theories`). In
+    physical units, theories are drawn only if one pressure unit holds for all runs.
     """
     shown, dataset = curves.study_curves(campaign, study), campaign[study].to_dataset()
-    physical, gap_words = units == "physical", label_of(curves.gap_name(dataset)).partition("  ")[0]
-    panels = _panels(dataset, physical=physical)
+    physical = units == "physical"
+    panels = Panel("reduced_pressure", "area_over_load"), Panel("reduced_pressure", curves.gap_name(dataset))
+    if physical:
+        panels = [panel_in_units("nominal_pressure", y, dataset) for y in ("contact_area_fraction", "mean_gap")]
     truths = {} if physical else {truth.runs.contact: truth for truth in shown.crosses}
     compared = [(line, truths[line.runs.contact]) for line in shown.lines if line.runs.contact in truths]
     fig, axes = new_panels(4.5, 2, sharex=True, height_ratios=(1, _LOWER)) if compared else new_panels(3.3)
     left, right = axes[0]
-    say(
-        fig,
-        "Contact area divided by nominal area (a), and mean gap (b), against the nominal pressure."
-        if physical
-        else f"""Ratio of contact area and load (a), A/A0 divided by the reduced pressure F/(E* h'rms A0), and
-        {gap_words} divided by rms height (b), against the reduced pressure.""",
-    )
-    _say_symbols(fig, shown, dataset)
     (loads, areas), (_, gaps) = (
         map(curves.drop_rounding_errors, drawn)
         for drawn in curves.draw_curves(shown, dict(zip(axes[0], panels, strict=True)), unloading=True)
     )
+    say(fig, "Results are of one realisation of the surface." if dataset.sizes["seed"] == 1 else "")
     x = (loads.min() / 1.6, loads.max() * 1.6)
     if references is not None and not physical:
+        say(fig, _THEORIES)
         _draw_references(axes[0], panels, references, x)
         if dataset.sizes["surface"] > 1:
             say(fig, "Theories are those of the first surface.")
         _draw_separate_summits(axes[0], panels, references, study, dataset, shown.looks)
     elif references is not None and (unit := _only_unit(shown)):
-        say(fig, _PERSSON)
+        say(fig, "Theories are those of contact without adhesion.")
         _draw_persson(axes[0], panels, references, x, unit)
     for ax, panel in zip(axes[0], panels, strict=True):
         panel.label(ax, lowest=not compared)
@@ -113,20 +93,12 @@ def area_and_gap(
             right.set_yticks([tick for tick in _SEPARATIONS if low < tick < high])
     if compared:
         say(fig, _COMPARED)
-        _draw_differences(axes[1], shown, compared, panels[1].y)
+        _draw_differences(axes[1], shown, compared, panels[1])
     say(fig, "" if physical else theories_of_flat_surfaces(dataset))
     for ax in axes[-1]:
         ax.set(xlim=x, xlabel=label_of(panels[0].x, panels[0].units[0]))
-    curves.add_legend(fig, shown)
+    legend_below(fig, shown.handles)
     return fig
-
-
-def _panels(dataset, *, physical):
-    """Return panels of area over load, or of area in physical units, and of the mean gap."""
-    if physical:
-        area, gap = (panel_in_units("nominal_pressure", y, dataset) for y in ("contact_area_fraction", "mean_gap"))
-        return area, gap
-    return Panel("reduced_pressure", "area_over_load"), Panel("reduced_pressure", curves.gap_name(dataset))
 
 
 def _only_unit(shown):
@@ -134,22 +106,6 @@ def _only_unit(shown):
     runs = [run for line in shown.lines for run in line.runs.by_seed.values()]
     units = [(float(run["contact_modulus"] * run["unit_slope"]), float(run["unit_height"])) for run in runs]
     return units[0] if len({float(f"{pressure:.6g}") for pressure, _ in units}) == 1 else None
-
-
-def _say_symbols(fig, shown, dataset):
-    """Explain symbols and their filling in the caption."""
-    curves.say_models(fig, shown, " in loading")
-    energies = {curve.runs.surface_energy > 0 for curve in (*shown.lines, *shown.crosses)}
-    if False in energies and any(curve.runs.model_name == ASPERITIES_NAME for curve in shown.lines):
-        say(fig, "Open shapes are without adhesion.")
-    if len(energies) > 1 and shown.crosses:
-        say(
-            fig,
-            """Crosses without adhesion are larger. Where adhesion has little effect, closed shapes and small crosses
-            lie inside open shapes and large crosses.""",
-        )
-    if dataset.sizes["seed"] == 1:
-        say(fig, "Results are of one realisation of the surface.")
 
 
 def _states(pressure, area, separation=None, unit=(1.0, 1.0)):
@@ -166,7 +122,6 @@ def _draw_persson(axes, panels, references, limits, unit=(1.0, 1.0)):
     states = _states(references["reduced_pressure"], references["persson_area_fraction"], separation, unit)
     draw_theory(axes[0], panels[0], states, limits, label="Persson", **_BLACK)
     if separation is not None:
-        say(axes[0], _YANG)
         look = _BLACK | {"ls": (0, (7, 2))}
         draw_theory(axes[1], panels[1], states, limits, label="Yang & Persson", **look)
 
@@ -174,7 +129,6 @@ def _draw_persson(axes, panels, references, limits, unit=(1.0, 1.0)):
 def _draw_references(axes, panels, references, limits):
     """Draw published results and theories of rough contact; `limits` are the smallest and the largest load."""
     (left, _), (area, _) = axes, panels
-    say(left, _PERSSON, _BUSH, _XU)
     _draw_persson(axes, panels, references, limits)
     for label, load, name, look in (
         ("Persson, corrected by Xu et al.", "reduced_pressure", "xu_area_fraction", {"ls": (0, (1, 1))}),
@@ -206,7 +160,6 @@ def _draw_separate_summits(axes, panels, references, study, dataset, looks):
             look = {"ls": (0, (1, 1.5)), "color": looks.material_colour(material)}
             theories.append((name, look, "fuller_tabor", theory))
     for name, look, prefix, theory in theories:
-        say(axes[0], _SUMMITS[name.curve])
         pressure, separation = (theory[f"{prefix}_reduced_{each}"] for each in ("pressure", "separation"))
         states = _states(pressure.where(pressure > 0), theory["summit_area_fraction"], separation)
         look |= {"lw": 0.8, "zorder": 1.8}
@@ -216,83 +169,59 @@ def _draw_separate_summits(axes, panels, references, study, dataset, looks):
 
 
 def _draw_differences(axes, shown, compared, gap):
-    """Draw the differences between asperities and boundary elements, and those of Ciavarella's estimate.
-
-    gap : name of the mean gap or mean separation.
-    """
-    for ax, (panel, error) in zip(axes, _COMPARED_IN, strict=True):
+    """Draw the differences in area and `gap` between asperities and boundary elements, and of Ciavarella's estimate."""
+    errors = {_AREA_OVER_PRESSURE: "area_error", gap: "gap_error" if gap.y == "reduced_gap" else "separation_error"}
+    for ax, (panel, error) in zip(axes, errors.items(), strict=True):
         for line, truth in compared:
-            load, members = _difference(line, truth, panel)
-            if members.size:
+            seeds = [seed for seed in line.stops if seed in truth.stops]
+            members = [_difference(panel, panel.points(line.stops[k]), panel.points(truth.stops[k])) for k in seeds]
+            if members := [each for each in members if each[0].size]:
+                load, values = at_common_loads(members, logarithmic=False)
                 name = line.runs.drawn_name._replace(curve="asperities relative to boundary elements")
                 of_curve = {"name": name, "asked": min(line.runs.asked, truth.runs.asked), "curves": len(compared)}
-                draw_members(ax, load, members, line.look | {"lw": 0.6}, positive=False, **of_curve)
+                draw_members(ax, load, values, line.look | {"lw": 0.6}, positive=False, **of_curve)
         logarithmic_axes(ax, "x")
         ax.axhline(0, color="0.6", lw=0.6, zorder=0)
-        error = "gap_error" if panel.y == "reduced_separation" and gap == "reduced_gap" else error
         ax.set_ylabel(rf"${quantity(error).symbol}$  (%)")
-    _draw_estimates(axes, shown, compared)
-
-
-def _difference(line, truth, panel):
-    """Return loads, and for each seed the differences in per cent between a curve and boundary elements.
-
-    Loads are those of the curve in the load range of boundary elements, and the largest load that both reach. Values of
-    both models are interpolated to these loads.
-    """
-    members, runs, truths = [], line.stops, truth.stops
-    for seed in [seed for seed in runs if seed in truths]:
-        (load, values), (true_load, true_values) = _pressed(panel, runs[seed]), _pressed(panel, truths[seed])
-        if load.size and true_load.size:
-            at = np.clip(load, true_load.min(), true_load.max())
-            at = at[np.isclose(at, load, rtol=_SAME_LOAD, atol=0)]
-            largest = min(load.max(), true_load.max())
-            if at.size and not np.isclose(at.max(), largest, rtol=_SAME_LOAD, atol=0):
-                at = np.append(at, largest)
-            logarithmic = panel.y == "contact_area_fraction"
-            own, true = (
-                interpolate(*each, at, logarithmic=logarithmic) for each in ((load, values), (true_load, true_values))
-            )
-            members.append((at, 100 * (own / true - 1)))
-    return at_common_loads(members, logarithmic=False) if members else (np.empty(0), np.empty((0, 0)))
-
-
-def _pressed(panel, run):
-    """Return the points of a run at compressive loads; with adhesion, areas may be reached in tension."""
-    load, values = panel.points(run)
-    return load[load > 0], values[load > 0]
-
-
-def _draw_estimates(axes, shown, compared):
-    """Draw the difference between Ciavarella's estimate from boundary elements without adhesion, and those with it."""
     bare = {truth.runs.contact[1:]: truth.runs.by_seed for _, truth in compared if not truth.runs.surface_energy}
-    single = sum(truth.runs.surface_energy > 0 for _, truth in compared) == 1
-    for line, truth in compared:
+    adhesive = [truth for _, truth in compared if truth.runs.surface_energy]
+    for truth in adhesive:
         seed = next(iter(truth.stops))
-        without = bare.get(line.runs.contact[1:], {}).get(seed)
-        if without is None or not truth.runs.surface_energy:
-            continue
-        if (states := _estimate(without, truth.runs.by_seed[seed])) is None:
-            continue
-        colour = shown.looks.material_colour(line.runs.labels.material)
-        for ax, (panel, _) in zip(axes, _COMPARED_IN, strict=True):
-            (load, true), (at, values) = _pressed(panel, truth.stops[seed]), panel.points(states)
-            if not load.size:
-                continue
-            inside = (at >= load.min()) & (at <= load.max())
-            known = common_loads.interpolate(load, true, at[inside], logarithmic=panel.y == "contact_area_fraction")
-            say(ax, _CIAVARELLA)
-            name = truth.runs.drawn_name._replace(curve="Ciavarella")
-            plot(ax, at[inside], 100 * (values[inside] / known - 1), name, color=colour, **_ESTIMATE)
-            named = colour if single else GREY
+        without = bare.get(truth.runs.contact[1:], {}).get(seed)
+        states = None if without is None else _estimate(without, truth.runs.by_seed[seed])
+        for ax, panel in zip(axes, errors if states else (), strict=False):
+            colour = shown.looks.material_colour(truth.runs.labels.material)
+            drawn = _difference(panel, panel.points(states), panel.points(truth.stops[seed]))
+            plot(ax, *drawn, truth.runs.drawn_name._replace(curve="Ciavarella"), color=colour, **_ESTIMATE)
+            named = colour if len(adhesive) == 1 else GREY
             ax.plot([], [], color=named, label="Ciavarella, from runs without adhesion", **_ESTIMATE)
+            say(ax, _CIAVARELLA)
+
+
+def _difference(panel, points, true):
+    """Return loads, and the differences in per cent from the points `true` of boundary elements, by interpolation.
+
+    Loads are those of the `points` in the range of `true`, and the largest load that both reach. With adhesion, areas
+    may be reached in tension, so only compressive loads count.
+    """
+    (load, values), (true_load, true_values) = (tuple(each[x > 0] for each in (x, y)) for x, y in (points, true))
+    if not load.size or not true_load.size:
+        return np.empty(0), np.empty(0)
+    at = np.clip(load, true_load.min(), true_load.max())
+    at = at[np.isclose(at, load, rtol=_SAME_LOAD, atol=0)]
+    largest = min(load.max(), true_load.max())
+    if at.size and not np.isclose(at.max(), largest, rtol=_SAME_LOAD, atol=0):
+        at = np.append(at, largest)
+    logarithmic = panel.y == "contact_area_fraction"
+    own, true = (interpolate(*each, at, logarithmic=logarithmic) for each in ((load, values), (true_load, true_values)))
+    return at, 100 * (own / true - 1)
 
 
 def _estimate(bare, adhesive):
     """Return the states of Ciavarella's estimate; None for few states."""
-    loading, height = bare["leg"].values == 0, float(unit_height(bare))
+    loading, height = bare["leg"].values == 0, float(bare["unit_height"])
     loads = (bare["nominal_pressure"] / bare["contact_modulus"]).values[loading]
-    areas, gaps = bare["contact_area_fraction"].values[loading], reduced_gap(bare).values[loading]
+    areas, gaps = bare["contact_area_fraction"].values[loading], bare["reduced_gap"].values[loading]
     length = float(adhesive["surface_energy"] / adhesive["contact_modulus"])
     states = ciavarella_states(loads, areas, gaps * height, length)
     slope = float(bare["unit_slope"])
@@ -301,16 +230,8 @@ def _estimate(bare, adhesive):
 
 # --- figure 5 ---
 
-# Largest number of surfaces that have their own columns of panels.
-_MOST_SURFACES = 3
 _AREA = Panel("relative_load", "contact_area_fraction")
 _RATIO, _RATIO_OF_SHAPE = Panel("reduced_pressure", "area_over_load"), Panel("relative_load", "area_over_relative_load")
-_WORDS = {
-    _AREA: "Contact area divided by nominal area, A/A0, against the relative load F/(E* A0)",
-    _RATIO: """Ratio of contact area and load, A/A0 divided by the reduced pressure F/(E* h'rms A0), against this
-    pressure""",
-    _RATIO_OF_SHAPE: "Ratio of contact area and load, A/A0 divided by the relative load F/(E* A0), against this load",
-}
 _SHAPED = "Relative loads take the place of reduced pressures, because a surface has a shape."
 
 
@@ -323,95 +244,43 @@ def multi_slope(
     boundary_elements: str | None = None,
     measurements: Sequence[Mapping[str, Any]] = (),
 ) -> Figure:
-    """Draw all runs of a study: area, and area over load; with several slopes of several surfaces, only the latter.
+    """Draw all runs of a study: area, and area over load.
 
     Area over load is drawn against the reduced pressure. If a surface has a shape, it is drawn against the relative
     load, because the unit of reduced pressures of a shape is not the rms slope, which a measurement has.
-
-    Parameters
-    ----------
-    campaign : the campaign dataset.
-    tables : files of measured curves; axes of relative loads show only curves whose relative loads are known.
-    measurements : for each table, the values of `label`, `citation`, `columns` (headings and factors), `material`,
-        `rms_slope` and `contact_modulus`. The last is E*, Pa, if the loads are pressures in Pa; it is None if they are
-        reduced pressures p/(E* h'rms). Unknown values are None.
+    Axes of relative loads show only measurements whose relative loads are known. The `contact_modulus` of a measurement
+    is E*, Pa, if its loads are pressures in Pa, and None if they are reduced pressures p/(E* h'rms).
     """
     shown = curves.study_curves(campaign, study, boundary_elements)
-    looks = shown.looks
-    # If colours distinguish surfaces and slopes, every material has a row of panels; a few surfaces have columns.
-    own_rows = looks.by_place and len(looks.materials) > 1
-    if own_rows and shown.crosses:
-        shown = _with_one_shape_per_model(shown)
-    elif not own_rows:
+    if not shown.looks.by_place:
         # Open markers do not hide each other where curves coincide.
         shown = curves.study_curves(campaign, study, boundary_elements, mfc="none")
-    rows = [[material] for material in looks.materials] if own_rows else [looks.materials]
-    shaped = has_shape(campaign[study].to_dataset())
-    ratio = _RATIO_OF_SHAPE if shaped else _RATIO
-    columns = [(_AREA, None), (ratio, None)]
-    surfaces = list(dict.fromkeys(surface for surface, _ in looks.places))
-    if looks.slopes_per_surface and len(surfaces) <= _MOST_SURFACES:
-        columns = [(ratio, surface) for surface in surfaces]
-    fig, panels = new_panels(0.5 + 2.8 * len(rows), len(rows), len(columns), sharex="col")
-    both = (_AREA, None) in columns
-    say(fig, f"{_WORDS[_AREA]} (left)." if both else "", _WORDS[ratio] + (" (right)." if both else "."))
-    say(fig, _SHAPED if shaped else "")
-    curves.say_models(fig, shown)
+    looks, shaped = shown.looks, has_shape(campaign[study].to_dataset())
+    # If colours distinguish surfaces and slopes, every material has a row of panels.
+    rows = [[material] for material in looks.materials] if looks.by_place else [looks.materials]
+    fig, panels = new_panels(0.5 + 2.8 * len(rows), len(rows), sharex="col")
+    columns = _AREA, _RATIO_OF_SHAPE if shaped else _RATIO
     for row, materials in zip(panels, rows, strict=True):
-        ratios = []
-        for ax, (panel, surface) in zip(row, columns, strict=True):
-            of_panel = shown._replace(
-                lines=_select(shown.lines, materials, surface), crosses=_select(shown.crosses, materials, surface)
-            )
-            [(_, values)] = curves.draw_curves(of_panel, {ax: panel}, unloading=True, count=len(shown.lines))
+        lines, crosses = (
+            [curve for curve in of_model if curve.runs.labels.material in materials]
+            for of_model in (shown.lines, shown.crosses)
+        )
+        of_row, of_panels = shown._replace(lines=lines, crosses=crosses), dict(zip(row, columns, strict=True))
+        drawn = curves.draw_curves(of_row, of_panels, unloading=True)
+        for (ax, panel), (_, values) in zip(of_panels.items(), drawn, strict=True):
             for k, (table, known) in enumerate(zip(tables, measurements, strict=True)):
                 if known["material"] in (None, *materials):
                     look = {"color": looks.material_colour(known["material"]), "ls": DASHES[k % len(DASHES)]}
                     values = np.append(values, _draw_measured(ax, panel, table, known, look))
-            words = [surface_label(campaign, surface)] if surface else []
-            words += [looks.material_name(materials[0])] if own_rows else []
-            ax.set_title(", ".join(words), loc="right", fontsize=8)
+            ax.set_title(looks.material_name(materials[0]) if len(rows) > 1 else "", loc="right", fontsize=8)
             panel.label(ax, lowest=materials is rows[-1])
-            ratios += [values] if panel is ratio else []
-        for ax in row[[panel is ratio for panel, _ in columns]]:
-            curves.limit_ratios(ax, np.concatenate(ratios))
-    curves.add_legend(fig, shown)
-    _say_slopes(fig, shown, own_rows=own_rows, shaped=shaped)
+        curves.limit_ratios(row[1], values)
+    say(fig, _SHAPED if shaped else "")
+    legend_below(fig, shown.handles)
     if measurements:
         named = "; ".join(f"{each['label']} ({each['citation']})" for each in measurements)
         say(fig, f"Lines without markers are measurements: {named}.")
     return fig
-
-
-def _say_slopes(fig, shown, *, own_rows, shaped):
-    """Explain how curves of different slopes differ; slopes of shapes are not those of one scaled topography."""
-    adhesive = {each.runs.surface_energy > 0 for each in shown.lines}
-    if len({slope for _, slope in shown.looks.places}) > 1 and not shaped:
-        if False in adhesive:
-            say(
-                fig,
-                """Without adhesion, the ratios of one topography at different slopes coincide, so that they hide each
-                other.""",
-            )
-        if True in adhesive:
-            say(fig, "Adhesion increases the contact area, most for the smallest slopes.")
-    if own_rows:
-        open_circles = "Open circles are without adhesion. " if False in adhesive else ""
-        say(fig, f"{open_circles}Rows of panels have different scales.")
-
-
-def _with_one_shape_per_model(shown):
-    """Return curves whose boundary elements all are upright crosses with a dashed line; the legend names the models."""
-    shape = {"marker": MODEL_MARKERS[REFERENCE_NAME], "ls": TRUTH_LINE["ls"], "lw": 0.6}
-    handles = {ASPERITIES_NAME: model_handle(ASPERITIES_NAME, **{"ls": "-", "lw": 0.9} | shown.looks.fill())}
-    handles = shown.looks.colour_handles() | handles | {REFERENCE_NAME: model_handle(REFERENCE_NAME, **shape)}
-    return shown._replace(crosses=[each._replace(look=each.look | shape) for each in shown.crosses], handles=handles)
-
-
-def _select(lines, materials, surface):
-    """Return the curves of some materials, and of one surface or, if it is None, of all surfaces."""
-    contacts = [(line, *line.runs.contact) for line in lines]
-    return [line for line, material, place, _ in contacts if material in materials and surface in (None, place)]
 
 
 def _draw_measured(ax, panel, table, known, look):
@@ -433,12 +302,11 @@ def _draw_measured(ax, panel, table, known, look):
 # --- figure 7 ---
 
 STIFFNESS = Panel("reduced_pressure", "reduced_stiffness")
-_STIFFNESS = """Contact stiffness K = -dp/du against the reduced pressure F/(E* h'rms A0), with the nominal pressure p
-and the mean separation u, in units of E* h'rms/h_rms (a) and of p/h_rms (b). In panel (b), a stiffness proportional to
-the pressure is a horizontal line."""
+_STIFFNESS = """The contact stiffness K is -dp/du, with the nominal pressure p and the mean separation u. In panel (b),
+a stiffness proportional to the pressure is a horizontal line."""
 _EDGES = """Boundary elements include the motion of the edges of contact. With adhesion they vary as the edges move
 across cells, for a single sphere by 7 to 60 %."""
-_INFINITE = """The black line is the theory of Yang and Persson for an infinite surface without adhesion, where the
+_INFINITE = """The theory of Yang and Persson is for an infinite surface without adhesion, where the
 stiffness at small loads is proportional to the load. On a finite surface it is larger, because only the highest parts
 touch (Pastewka et al., Phys. Rev. E 87 (2013) 062809)."""
 
@@ -450,12 +318,9 @@ def stiffness(campaign: xr.DataTree, references: xr.Dataset | None = None, *, st
     fig, [axes] = new_panels(3.3)
     dataset = campaign[study].to_dataset()
     say(fig, _STIFFNESS)
-    curves.say_models(fig, shown)
     models = {curve.runs.model_name for curve in (*shown.lines, *shown.crosses)}
     if ASPERITIES_NAME in models:
         say(fig, "The asperity model gives the stiffness for spots that do not form, break or unite.")
-        if not all(line.runs.surface_energy for line in shown.lines):
-            say(fig, "Open shapes are results without adhesion.")
     if models - {ASPERITIES_NAME}:
         say(fig, _EDGES)
     panels = dict(zip(axes, (STIFFNESS, Panel("reduced_pressure", "stiffness_over_pressure")), strict=True))
@@ -475,5 +340,5 @@ def stiffness(campaign: xr.DataTree, references: xr.Dataset | None = None, *, st
     axes[0].set(xlim=x, ylim=(curves.drop_rounding_errors(stiffnesses).min() / 2, stiffnesses.max() * 2))
     axes[1].set(xlim=x, ylim=(0, 1.15 * ratios.max()))
     say(fig, "States with negative pressure or negative stiffness are left out.", theories_of_flat_surfaces(dataset))
-    curves.add_legend(fig, shown)
+    legend_below(fig, shown.handles)
     return fig

@@ -23,10 +23,8 @@ from icha.datasets.quantities import LOSS_PARTS, label_of
 from icha.figures.captions import (
     attractions_of,
     grid_of_loops,
-    only_model,
     only_spheres,
     range_of_attraction,
-    without_fit,
 )
 from icha.figures.curves import drop_rounding_errors, gap_name
 from icha.figures.drawn import Name, plot, record, say
@@ -68,10 +66,13 @@ from icha.support.formatting import choose_unit
 
 # The axis of the Tabor parameter is logarithmic if the ratio of its largest to its smallest value exceeds this number.
 _TABOR_SPAN = 10.0
-_STATE = ("contact_area_fraction", "reduced_separation")
 
 _TABOR = """The Tabor parameter is (R Δγ²/E*²)^(1/3) divided by the range of attraction. R is the radius of a sphere; on
 a rough surface, 1/R is the rms curvature."""
+
+
+_RANGES = """Contact area and mean separation at the load given in the figure, against the Tabor parameter. A line joins
+runs that differ only in the range of attraction."""
 
 
 @in_style
@@ -105,33 +106,25 @@ def tabor(campaign: xr.DataTree, *, study: str, kind: str | None = None, target:
     # The name of a material has no range of attraction, because lines of different ranges are one line.
     looks = Looks(campaign, [study], [contact for contact, _ in curves], only_drawn=True)
     fig, [panels] = new_panels(3.1)
-    labels = [label_of(name) for name in ("contact_area_fraction", gap_name(campaign[study].to_dataset()))]
-    say(
-        fig,
-        f"""Real contact area divided by nominal area (a) and {labels[1].partition("  ")[0]} divided by rms height (b)
-        at the load given in the figure.""",
-        _TABOR,
-        """A line joins runs that differ only in the range of attraction. At a given surface energy, asperities with a
-        longer range (smaller Tabor parameter) jump into contact from a larger distance.""",
-        "Dashed lines are results without adhesion." if bare else "",
-    )
+    quantities = ("contact_area_fraction", gap_name(campaign[study].to_dataset()))
+    say(fig, _RANGES, _TABOR)
     drawn = []
     for (contact, applicable), line in curves.items():
-        points = Points(line, "tabor_parameter", *_STATE)
+        points = Points(line, "tabor_parameter", *quantities)
         for number, ax in enumerate(panels, 1):
             points.draw(ax, looks.look(contact, applicable=applicable), number)
         drawn += points.means[0].tolist()
     for k, (contact, line) in enumerate(bare.items()):
         look = {"color": looks.colour(contact) if looks.by_place else GREY, "label": None if k else "no adhesion"}
-        for ax, name in zip(panels, _STATE, strict=True):
+        for ax, name in zip(panels, quantities, strict=True):
             mean = np.mean([float(state[name]) for group in line for state in group.by_seed.values()])
             record(ax, [min(drawn), max(drawn)], [mean, mean], line[0].drawn_name)
             ax.axhline(mean, ls=(0, (5, 2)), lw=1, zorder=1, **look)
-    for ax, label in zip(panels, labels, strict=True):
+    for ax, name in zip(panels, quantities, strict=True):
         if max(drawn) > _TABOR_SPAN * min(drawn):
             logarithmic_axes(ax, "x")
         _shade_unverified(ax, min(drawn))
-        ax.set(xlabel=label_of("tabor_parameter"), ylabel=label)
+        ax.set(xlabel=label_of("tabor_parameter"), ylabel=label_of(name))
     panels[0].set_title(shown, loc="right")
     legend_below(fig, looks.handles())
     return fig
@@ -159,9 +152,7 @@ def _pull_off_of_spheres(runs):
         fig,
         "Pull-off force (a) and energy lost from first contact to separation (b) of smooth spheres.",
         _TABOR,
-        "Filled markers are boundary elements at the range itself." if resolved.any() else "",
-        "Open markers are boundary elements in the limit of a short range." if not resolved.all() else "",
-        "The solid line is the theory of Maugis for a constant attraction. JKR and DMT are its limits.",
+        "The theory of Maugis is for a constant attraction; JKR and DMT are its limits.",
     )
     for ax, values in zip(panels, (pull_off, loss), strict=True):
         ax.plot(at, values, color=GREY, lw=0.6, zorder=1)
@@ -257,19 +248,10 @@ def pull_off(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] =
             words = [REFERENCE_NAME, *([looks.shape_name(contact)] if several else [])]
             look = {"marker": looks.cross(contact, shape=_OBLIQUE)["marker"]} | _TRUTH
             handles[", ".join(words)] = model_handle(REFERENCE_NAME, **look)
-        say(
-            fig,
-            f"""{"Crosses and stars" if several else "Crosses"} with dashed lines are boundary elements, other symbols
-            are the asperity model, on the same topographies.""",
-        )
     say(
         fig,
-        only_model(models),
         range_of_attraction(attractions_of(run for point in points for run in point.by_seed.values())),
-        f"Points at one slope{' or load' if by_load else ''} are drawn side by side; lines guide the eye.",
-        "Without adhesion (open markers), pull-off is zero; a logarithmic axis is linear near zero."
-        if not all(point.surface_energy for point in points)
-        else "",
+        "Points at one slope or load are drawn side by side; lines guide the eye.",
         """The pull-off force of a shape is the pull-off pressure times the area of the square; it is the variable
         `pull_off_force`."""
         if any(has_shape(campaign[each].to_dataset()) for each in studies)
@@ -344,11 +326,6 @@ _LOSS_SPAN = 30.0
 _LEAST_SHARE = 1e-6
 # Variables along x and y.
 _LOSS = ("largest_contact_area_fraction", "hysteresis_loss_over_surface_energy")
-# What negative parts are.
-_GAINS = {
-    "loss_by_coalescence": "Negative parts by coalescence are energy gained when spots unite or separate.",
-    "loss_unattributed": "A negative unattributed part is an error of steps or of interactions without reciprocity.",
-}
 # Opacity of the bars of runs to which the model is not applicable.
 _PALE = 0.35
 
@@ -379,7 +356,6 @@ def loss(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
         """Hysteresis loss of runs with adhesion, divided by the surface energy, against the largest contact area on the
         path divided by the nominal area (a). The loss is the energy per nominal area that is dissipated on a path from
         first contact to the largest load and back to complete separation.""",
-        "Crosses are boundary elements, other symbols the asperity model." if truths else only_model(models),
         """With boundary elements, steps add an error of at most 0.1 % of the largest work done in loading; the error of
         the grid is larger."""
         if models != [ASPERITIES_NAME]
@@ -395,7 +371,9 @@ def loss(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
     say(
         fig,
         """Panel (b) shows the causes of the loss at the largest load of every series of panel (a), with the marker of
-        the series below the bar. Each part is divided by the sum of the magnitudes of all parts.""",
+        the series below the bar. Each part is divided by the sum of the magnitudes of all parts. Negative parts by
+        coalescence are energy gained when spots unite or separate; a negative unattributed part is an error of steps or
+        of interactions without reciprocity.""",
         "Where the asperity model has the same series as boundary elements, the causes are those of the asperity model."
         if truths
         else "",
@@ -405,7 +383,7 @@ def loss(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
     shown = _draw_parts(right, lines | alone, {key: _look_of_loss(looks, key, truths) for key in runs}, looks)
     say(fig, grid_of_loops(campaign, studies))
     handles |= {label_of(name): Patch(ec="black", lw=0.5, **PARTS[name]) for name in shown}
-    legend_below(fig, handles, looks.heading(), rows=looks.slopes_per_surface)
+    legend_below(fig, handles, looks.heading())
     return fig
 
 
@@ -447,12 +425,9 @@ def _look_of_loss(looks, key, truths):
 
 
 def fit_line(x: np.ndarray, y: np.ndarray, along: np.ndarray) -> tuple[np.ndarray, float, float]:
-    """Fit a straight line by least squares.
+    """Fit a straight line; return its values at `along`, the coefficient of determination, and an exponent.
 
-    Returns
-    -------
-    Values of the line at `along`; coefficient of determination; exponent of a power law through the same points. The
-    exponent is NaN if a value of y is not positive.
+    The exponent is that of a power law through the same points; NaN if a value of y is not positive.
     """
     line = linregress(x, y)
     exponent = linregress(np.log(x), np.log(y)).slope if np.all(y > 0) else np.nan
@@ -482,9 +457,7 @@ def _draw_parts(ax, runs, markers, looks):
             bar_look = {"ec": "black", "lw": 0.4, "alpha": None if applicable else _PALE} | PARTS[name]
             ax.bar(position, share, 0.8, bottom=above if share > 0 else below, **bar_look)
             above, below = above + max(share, 0), below + min(share, 0)
-            say(ax, _GAINS.get(name, "") if share < -100 * _LEAST_SHARE else "")
         ax.plot(position, -0.055, transform=ax.get_xaxis_transform(), clip_on=False, **markers[key])
-    say(ax, "The unattributed loss has none of these causes." if "loss_unattributed" in shown else "")
     ax.axhline(0, color="black", lw=0.6)
     ax.set(xlim=(-0.7, len(bars) - 0.3), ylabel="share of losses and gains (%)")
     ax.set_xticks(range(len(bars)), [looks.place_name(tuple(place)) for (_, *place), *_ in bars], rotation=90)
@@ -511,13 +484,11 @@ _ONE_SEED = {"ls": "none", "ms": 3.2, "mew": 0.6, "mfc": "white"}
 _MEAN = {"lw": 0.9, "ms": 5.0}
 
 _WORK = """Apparent work of adhesion of rough spheres, divided by the work of adhesion Δγ of the material, against the
-rms height of the roughness. Circles are fits of the theory of Johnson, Kendall and Roberts (JKR) to the first loading,
-squares fits to the last unloading up to the largest tension. Each fit compares cubes of contact radii at given forces,
-with the given E* and R. Triangles are the pull-off force divided by the pull-off force 3/2 π Δγ R of a smooth sphere.
-Closed markers are means over the seeds; open markers are the single seeds. Lines join means of the same surface or
-shape and the same material. Values of a smooth sphere by JKR are 1."""
-_DIRECTED = """For circles, Δγ is that of advancing edges; for squares and triangles, that of receding edges. Fits to
-unloading leave out states whose edge stands."""
+rms height of the roughness. The theory of Johnson, Kendall and Roberts (JKR) is fitted to the first loading, and to the
+last unloading up to the largest tension. Each fit compares cubes of contact radii at given forces, with the given E*
+and R. The pull-off force of a smooth sphere by JKR is 3/2 π Δγ R. Closed markers are means over the seeds; open markers
+are the single seeds. With two works of adhesion, Δγ of loading is that of advancing edges, and Δγ of unloading and
+pull-off that of receding edges; fits to unloading then leave out states whose edge stands."""
 
 
 @in_style
@@ -542,9 +513,7 @@ def work_of_adhesion(
     colours = dict(zip(contacts, distinct_colours(len(contacts)), strict=True))
     fig = new_figure(1.25 * ONE_COLUMN, 2.9)
     ax = fig.subplots()
-    dataset = campaign[study].to_dataset()
-    directed = bool((dataset["receding_energy"] > dataset["surface_energy"]).any())
-    say(fig, _WORK, _DIRECTED if directed else "", without_fit(dataset), only_spheres(dataset))
+    say(fig, _WORK, only_spheres(campaign[study].to_dataset()))
     handles = {name: legend_handle(color=colour, lw=4) for name, colour in colours.items() if name}
     for (k, (quantity, (name, marker))), contact in itertools.product(enumerate(_WORKS.items()), contacts):
         # Colours distinguish the quantities, or surfaces and materials if there are several.

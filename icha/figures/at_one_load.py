@@ -11,12 +11,11 @@ from icha.analysis.model_error import state_of
 from icha.contact.attraction import FINITE_RANGE
 from icha.datasets.campaign import spots_of
 from icha.datasets.labels import slopes_of
-from icha.figures.captions import attractions_of, range_of_attraction, theories_of_flat_surfaces
-from icha.figures.curves import drop_rounding_errors, topographies
+from icha.figures.captions import about_boundary_elements, theories_of_flat_surfaces
+from icha.figures.curves import drop_rounding_errors
 from icha.figures.drawn import plot, say
 from icha.figures.ensembles import draw_members, join_bins
 from icha.figures.looks import (
-    ASPERITIES_NAME,
     MODEL_MARKERS,
     REFERENCE_NAME,
     TRUTH_LINE,
@@ -49,24 +48,10 @@ def _draw(ax, lines, line, look, own, true, **truth_look):
         draw_members(ax, *true, truth_look, positive=True, name=line.truth_name, curves=None, ls=TRUTH_LINE["ls"])
 
 
-def _say_models(fig, lines, *, markers):
-    """Explain the lines of the models, which have `markers` or none."""
-    if lines[0].runs.model_name == ASPERITIES_NAME:
-        say(fig, f"Solid lines{' with circles' if markers else ''} are results of the asperity model.")
-        bare = not all(line.runs.surface_energy for line in lines)
-        say(fig, "Open circles are results without adhesion." if bare and markers else "")
-    else:
-        say(fig, f"Solid lines{' with crosses' if markers else ''} are results of boundary elements.")
-    if any(line.truths for line in lines):
-        counts = [(len(line.members), len(line.truths)) for line in lines if line.truths]
-        crosses = " with crosses" if markers else ""
-        say(fig, f"Dashed lines{crosses} are boundary elements, {topographies(counts)}.")
-    runs = (run for line in lines for run, _ in (*line.members, *line.truths))
-    say(fig, range_of_attraction(attractions_of(runs)))
-
-
 def _finish(fig, panels, dataset, lines, looks, *, markers=True):
-    """Add titles and legend."""
+    """Add titles, legend and sentences on boundary elements."""
+    seeds = [(len(line.members), len(line.truths)) for line in lines if line.truths]
+    say(fig, about_boundary_elements((run for line in lines for run, _ in (*line.members, *line.truths)), seeds))
     shown, model = lines[0].runs.labels, lines[0].runs.model_name
     several = {shown.surface: dataset.sizes["surface"] > 1, slope_label(shown.rms_slope): len(slopes_of(dataset)) > 1}
     place = ", ".join(words for words, needed in several.items() if needed)
@@ -92,6 +77,17 @@ _BESIDE_MARKERS = 14
 # Reduced pressures count as equal up to this relative difference.
 _SAME_LOAD = 0.01
 
+_DENSITIES = """Probability density of the gap u (a), and of the contact pressure p (b), both over the whole nominal
+area. Gaps are in units of the rms height, pressures in units of E* h'rms; negative pressures are tension. The title of
+panel (a) gives the state. The density in panel (a) has the integral 1 - A/A0 - f, where f is the fraction of the
+nominal area with a negative computed gap outside the spots. That in panel (b) has the integral A/A0; at a finite range
+of attraction, it also contains tension across gaps."""
+_PERSSON = """Persson's theory, of contact without adhesion, is at the reduced pressures of the runs; runs at the same
+pressure share a line."""
+_TAIL = """Boundary elements resolve only the mean tension in a grid cell, so their tensile tail ends in a peak. Dotted
+lines are the density of the singular tension at the edge of contact, L K_c²/(π|p|³A0), where L is the length of this
+edge and K_c² = 2 E* Δγ."""
+
 
 @in_style
 def distributions(campaign: xr.DataTree, *, study: str, kind: str | None = None, target: float | None = None) -> Figure:
@@ -100,26 +96,7 @@ def distributions(campaign: xr.DataTree, *, study: str, kind: str | None = None,
     looks, each_look = _begin(campaign, study, lines)
     fig, [(left, right)] = new_panels(3.1)
     dataset = campaign[study].to_dataset()
-    shown = [run for line in lines for run, _ in (*line.members, *line.truths)]
-    say(
-        fig,
-        """Probability density of the gap u (a), on logarithmic axes, and of the contact pressure p (b), both over the
-        whole nominal area. Gaps are in units of the rms height, pressures in units of E* h'rms. The title of panel (a)
-        gives the state.""",
-    )
-    _say_models(fig, lines, markers=True)
-    say(
-        fig,
-        "The density in panel (b) has the integral A/A0.",
-        "That of boundary elements at a finite range also contains tension across gaps."
-        if FINITE_RANGE in attractions_of(shown)
-        else "",
-        """The density in panel (a) has the integral 1 - A/A0 - f, where f is the fraction of the nominal area with a
-        negative computed gap outside the spots.""",
-        "Adhesion causes the tensile tail at negative pressures."
-        if any(line.runs.surface_energy for line in lines)
-        else "",
-    )
+    say(fig, _DENSITIES)
     lowest, highest, top, floor = -0.3, 0.3, 0.0, 1.0
     for line, look in zip(lines, each_look, strict=True):
         gaps, pressures = gap_densities(line.members), pressure_densities(line.members)
@@ -167,13 +144,7 @@ def _draw_persson(ax, highest, lines, each_look):
         plot(ax, p, density, name if several else "Persson", color=colour if several else BLACK, **look)
     if drawn:
         ax.plot([], [], color=GREY if several else BLACK, label="Persson", **look)
-        say(
-            ax,
-            "The black line is Persson's theory of contact without adhesion."
-            if not several
-            else """Thin lines without markers are Persson's theory of contact without adhesion, at the reduced pressure
-            of the runs of the same colour; runs at the same pressure share a line.""",
-        )
+        say(ax, _PERSSON)
 
 
 def _draw_singular_tail(ax, line, lowest, colour):
@@ -182,12 +153,7 @@ def _draw_singular_tail(ax, line, lowest, colour):
     if p.size:
         look = {"ls": ":", "lw": 1.1, "zorder": 3}
         plot(ax, p, density, line.truth_name._replace(curve="singular tension at the edge"), color=colour, **look)
-        say(
-            ax,
-            """Boundary elements resolve only the mean tension in a grid cell, so their tensile tail ends in a peak. For
-            tensions that the grid does not resolve, dotted lines show the density of the singular tension at the edge
-            of contact, L K_c²/(π|p|³A0), where L is the length of this edge and K_c² = 2 E* Δγ.""",
-        )
+        say(ax, _TAIL)
         ax.plot([], [], color=GREY, label="singular tension at the edge", **look)
 
 
@@ -249,7 +215,8 @@ _ALONE = 4.5
 # Largest number of points of a cumulative curve; more points would not be distinguishable.
 _CURVE_POINTS = 300
 
-_ABOVE = "number per nominal area of patches that are larger than A."
+_ABOVE = """number per nominal area of patches that are larger than A. Patches of the asperity model are united spots;
+those of boundary elements are grid cells in contact that are connected by common edges."""
 
 
 @in_style
@@ -271,11 +238,6 @@ def patch_sizes(campaign: xr.DataTree, *, study: str, kind: str | None = None, t
     density = """number of patches per nominal area and per interval of the patch area A (a), where neighbouring
     intervals with few patches are joined, and """
     say(fig, "Sizes of the contact patches at the load given in the figure: " + (density if dense else "") + _ABOVE)
-    _say_models(fig, lines, markers=dense)
-    of_asperities = lines[0].runs.model_name == ASPERITIES_NAME
-    if any(line.truths for line in lines) or not of_asperities:
-        say(fig, "Patches of boundary elements are grid cells in contact that are connected by common edges.")
-    say(fig, "In the asperity model, united spots count as one patch." if of_asperities else "")
     for line, look, (own, true) in zip(lines, each_look, areas, strict=True):
         smooth = look | {"marker": "none", "lw": 1.4 * look["lw"]}
         drawn = [(patch_density, look, MODEL_MARKERS[REFERENCE_NAME]), (patches_above, smooth, "none")]
@@ -300,16 +262,8 @@ def patch_areas(run: xr.Dataset, snapshot: int) -> np.ndarray:
 def patch_density(areas: Sequence[np.ndarray], nominal_area: float) -> tuple[np.ndarray, np.ndarray]:
     """Return densities in bins of the patch area: number of patches, divided by nominal area and by bin width.
 
-    Bins with few patches are joined.
-
-    Parameters
-    ----------
-    areas : patch areas of every member of an ensemble, in ascending order.
-
-    Returns
-    -------
-    The patch areas in the middle of k bins, and an array of shape (members, k): the densities of every member. The
-    number of patches in a bin is density times bin width times nominal area.
+    `areas` are the patch areas of every member of an ensemble, in ascending order. Bins with few patches are joined.
+    Return the patch areas in the middle of k bins, and the densities of every member, (members, k).
     """
     pooled = np.sort(np.concatenate(areas))
     if not len(pooled):

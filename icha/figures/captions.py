@@ -1,4 +1,7 @@
-"""Sentences that captions of several figures have, and sentences that count missing runs and pale runs."""
+"""Sentences that captions of several figures have, and sentences that count missing runs and pale runs.
+
+A caption states what is drawn and what no label shows. It does not repeat the legend.
+"""
 
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -8,7 +11,7 @@ from matplotlib.figure import Figure
 
 from icha.contact.attraction import FINITE_RANGE, SHORT_RANGE
 from icha.datasets.variables.campaign import LOADED_RUNS
-from icha.figures.select import has_layer, has_shape, lacks_fit, lacks_sphere
+from icha.figures.select import has_layer, has_shape
 from icha.uncertainty.grid_error import cells_of_loops, describe_loops
 from icha.uncertainty.left_out import absent_materials, left_out_of_study
 from icha.uncertainty.sensitivity import left_out_of_samples
@@ -34,10 +37,16 @@ def attractions_of(runs: Iterable[xr.Dataset]) -> set[str]:
     return {run.attrs.get("attraction", "") for run in runs}
 
 
-def only_model(names: Sequence[str]) -> str:
-    """Return which model all symbols are, if the legend names only one."""
-    one = {"asperities": "the asperity model"}.get(names[0], names[0])
-    return f"All symbols are {one}." if len(names) == 1 else ""
+def about_boundary_elements(runs: Iterable[xr.Dataset], seeds: Iterable[tuple[int, int]] = ()) -> str:
+    """Return the range of attraction of boundary elements, and on how many topographies they are, if on fewer.
+
+    `seeds` has the numbers of seeds of the asperity model and of boundary elements, for each pair of curves.
+    """
+    words = range_of_attraction(attractions_of(runs))
+    if fewer := sorted({truths for asperities, truths in seeds if truths != asperities}):
+        alone = f"{' or '.join(map(str, fewer))} of the topographies alone"
+        words += f" Boundary elements are on {alone}, so their means also differ by the seeds."
+    return words
 
 
 def units_of_shapes(figure: Figure, studies: Sequence[xr.Dataset]) -> str:
@@ -57,19 +66,17 @@ def theories_of_flat_surfaces(study: xr.Dataset) -> str:
     drawn."""
 
 
-def without_fit(study: xr.Dataset) -> str:
-    """Return why fits of JKR are missing, if some are."""
-    if not lacks_fit(study):
-        return ""
-    return """Where a fit is missing, the Tabor parameter of the sphere is below 3, the value from which JKR holds; or
-    there are fewer than three states; or the contact is so small that Hertz's law without adhesion fits better."""
-
-
 def only_spheres(study: xr.Dataset) -> str:
-    """Return which runs a figure of spheres with adhesion leaves out, if any."""
-    left_out = ["Runs on shapes without a radius, and runs on layers, are left out."] if lacks_sphere(study) else []
-    left_out += ["Runs without adhesion are left out."] if (study["surface_energy"] == 0).any() else []
-    return " ".join(left_out)
+    """Return why fits of JKR may be missing, and which runs a figure of spheres with adhesion leaves out, if any."""
+    words = [
+        """Where a fit is missing, the Tabor parameter of the sphere is below 3, the value from which JKR holds; there
+        are fewer than three states; or the contact is so small that Hertz's law without adhesion fits better."""
+    ]
+    if "shape_radius" not in study or study["shape_radius"].isnull().any() or has_layer(study):
+        words.append("Runs on shapes without a radius, and runs on layers, are left out.")
+    if (study["surface_energy"] == 0).any():
+        words.append("Runs without adhesion are left out.")
+    return " ".join(words)
 
 
 def grid_of_loops(campaign: xr.DataTree, studies: Sequence[str]) -> str:
@@ -83,12 +90,8 @@ def count_runs(
 ) -> str:
     """Count the runs that a figure leaves out or draws pale, in sentences for the end of its caption; often empty.
 
-    Parameters
-    ----------
-    data : datasets of the figure, by name.
-    studies : names of the studies whose runs the figure shows.
-    models : names of the models that the figure shows; empty if they are not known.
-    of_loss : True if the figure shows losses, which runs that failed checks of their loss do not have.
+    `data` are the datasets of the figure by name, `studies` and `models` the names of what it shows; no models if they
+    are not known. `of_loss` is True if it shows losses, which runs that failed checks of their loss do not have.
     """
     found: list[str] = []
     for name in studies:
@@ -105,10 +108,9 @@ def count_runs(
                 "intervals. The report lists the reasons."
             )
         found += [f"Without a curve{suffix}: {each}." for each in absent_materials(study)]
-        if "applicability" in study:  # not in campaigns of earlier versions
-            shown = study["status"].isin(LOADED_RUNS)
-            shown &= study["model"].isin(list(models)) if models else True
-            reasons = study["applicability"].where(shown, "").values.ravel()
-            for reason, count in Counter(filter(None, reasons.tolist())).items():
-                found.append(f"Note on {count} {'run' if count == 1 else 'runs'}{suffix}: {reason}.")
+        shown = study["status"].isin(LOADED_RUNS)
+        shown &= study["model"].isin(list(models)) if models else True
+        reasons = study["applicability"].where(shown, "").values.ravel()
+        for reason, count in Counter(filter(None, reasons.tolist())).items():
+            found.append(f"Note on {count} {'run' if count == 1 else 'runs'}{suffix}: {reason}.")
     return " ".join(found)

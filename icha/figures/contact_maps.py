@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from icha.analysis.model_error import contact_of_spots, jaccard, snapshot_if_any, state_of
 from icha.contact.model import EVENT_KINDS
 from icha.contact.models import REFERENCE_MODEL
-from icha.datasets.campaign import find_snapshot, unit_height
+from icha.datasets.campaign import find_snapshot
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of
 from icha.figures.captions import attractions_of, grid_of_loops, range_of_attraction
@@ -96,13 +96,7 @@ def contact_map(
 ) -> Figure:
     """Draw the spots of one snapshot of one run.
 
-    Parameters
-    ----------
-    campaign : the campaign dataset.
-    surface : dataset of the surface file, with the topography of the run.
-    truth : dataset of the same run with boundary elements, including contact maps; None without such a run.
-    run : labels of the run.
-    kind, target : kind and target of the snapshot; None for the first snapshot.
+    `truth` is the same run with boundary elements, including contact maps; None without such a run.
     """
     labels = RunLabels(*run)
     data = select_complete_run(campaign, labels)
@@ -284,34 +278,20 @@ _FEW = 60
 _SIZE = 5.0
 _LEAST_SIZE = 1.6
 
+_EVENTS = """Events of one run. Panel (a) shows where spots formed in the first loading and broke in the last unloading,
+on a map of the topography with the highest parts white. Marks of unions are at the centre of the united spot. The
+legend gives the number of marks of each kind. Panel (b) shows the number of events since the beginning of loading or
+unloading against the mean separation, in the colours of panel (a); thin lines count unions."""
+
 
 @in_style
 def snap_map(campaign: xr.DataTree, surface: xr.Dataset, *, run: Sequence) -> Figure:
-    """Draw the events of one run on a map of the topography, and the number of events against the mean separation.
-
-    Parameters
-    ----------
-    campaign : the campaign dataset.
-    surface : dataset of the surface file, with the topography of the run.
-    run : labels of the run.
-    """
+    """Draw the events of one run on a map of the topography, and the number of events against the mean separation."""
     labels = RunLabels(*run)
     data = select_complete_run(campaign, labels)
     events = _events(data)
     fig, [(where, when)] = new_panels(3.1, width_ratios=(1.3, 1))
-    unions = "coalescence" in events["kind"]
-    say(
-        fig,
-        """Events of one run. Panel (a) shows where spots formed in the first loading and broke in the last unloading,
-        on a map of the topography with the highest parts white.""",
-        "A spot forms by a jump into contact and breaks by a jump off." if float(data["surface_energy"]) else "",
-        "Marks of unions are at the centre of the united spot." if unions else "",
-        """The legend gives the number of marks of each kind. Panel (b) shows the number of events since the beginning
-        of loading (solid lines) or unloading (dashed lines) against the mean separation, in the colours of panel
-        (a).""",
-        "Thin lines count unions." if unions else "",
-        grid_of_loops(campaign, [labels.study]),
-    )
+    say(fig, _EVENTS, grid_of_loops(campaign, [labels.study]))
     handles = _draw_places(where, topography_of(data, surface), events)
     _draw_counts(when, events)
     title = f"{material_label(campaign[labels.study].to_dataset(), labels.material)}, {slope_label(labels.rms_slope)}"
@@ -372,7 +352,7 @@ def _events(run):
         "branch": run["branch"].sel(step=steps).values.astype(object)[shown],
         "x": run["event_x"].values[shown],
         "y": run["event_y"].values[shown],
-        "separation": run["event_separation"].values[shown] / float(unit_height(run)),
+        "separation": run["event_separation"].values[shown] / float(run["unit_height"]),
     }
 
 
@@ -386,17 +366,15 @@ _COVERED = 0.98
 # Space around the largest contact, divided by its width.
 _MARGIN = 0.15
 
+_PRESSURES = """Maps of the contact pressure at snapshots of one run with boundary elements, in the order of the path.
+Compression is red, tension is blue, each with its own scale, which ends at the 98 % quantile in contact in all maps.
+Grey regions are out of contact. The title of a panel gives the force, or the reduced pressure p* = F/(E* h'rms A0) and
+the contact area, to which cells at the edges contribute in part."""
+
 
 @in_style
 def pressure_maps(campaign: xr.DataTree, maps: xr.Dataset, *, run: Sequence) -> Figure:
-    """Draw the pressure at the snapshots of a run; with more than six snapshots, at six of them.
-
-    Parameters
-    ----------
-    campaign : the campaign dataset.
-    maps : dataset of the file of the run.
-    run : labels of the run.
-    """
+    """Draw the pressure at the snapshots of a run; with more than six snapshots, at six of them."""
     labels = RunLabels(*run)
     select_complete_run(campaign, labels)
     count = maps.sizes.get("snapshot", 0)
@@ -417,17 +395,7 @@ def pressure_maps(campaign: xr.DataTree, maps: xr.Dataset, *, run: Sequence) -> 
     side = float(maps["period"]) * length
     fig, panels, columns = new_grid(len(shown), 3, 2.7, 2.15, room=(0.65, 0.1), sharex=True, sharey=True)
     free = str(maps["boundary"].values) == "free"
-    say(
-        fig,
-        """Maps of the contact pressure at snapshots of one run with boundary elements, in the order of the path.
-        Compression is red, tension is blue, each with its own scale, and grey regions are out of contact.""",
-        "Tension is largest at the edges of contact." if float(maps["surface_energy"]) else "",
-        """The title of a panel gives branch and force. All maps show the region around the largest contact."""
-        if free
-        else """The title of a panel gives the reduced pressure p* = F/(E* h'rms A0) and the contact area, to which
-        cells at the edges contribute in part.""",
-        "The scales end at the 98 % quantiles of pressure and tension in contact in all maps.",
-    )
+    say(fig, _PRESSURES)
     window = _touched_region(touching.any(axis=0), free)
     for ax, k in zip(panels, shown, strict=True):
         cells = np.where(touching[k], pressure[k] * factor, np.nan)

@@ -6,23 +6,20 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from icha.analysis.common_loads import at_common_loads
 from icha.contact.models import REFERENCE_MODEL
 from icha.datasets.quantities import label_of, quantity
 from icha.figures import select
-from icha.figures.captions import attractions_of, range_of_attraction
+from icha.figures.captions import about_boundary_elements
 from icha.figures.drawn import Name, plot, record, say
 from icha.figures.ensembles import draw_members, draw_points, mark_fewer
 from icha.figures.looks import (
     ASPERITIES_NAME,
     BRANCH_DASHES,
     MODEL_MARKERS,
-    REFERENCE_NAME,
     Looks,
-    legend_below,
     model_handle,
 )
 from icha.figures.style import GREY, legend_handle, logarithmic_axes
@@ -83,7 +80,7 @@ def quantity_of(states: xr.Dataset | Mapping[str, np.ndarray], name: str) -> np.
     """Return a quantity of all steps of a run; ratios are NaN unless load and stiffness are positive."""
     if name in states:
         return np.asarray(states[name], float)
-    if name == "reduced_gap":  # also the gap of runs is called separation
+    if name == "reduced_gap":  # theories are for periodic surfaces, whose gap is the separation
         return quantity_of(states, "reduced_separation")
     if name == "relative_load":
         return quantity_of(states, "reduced_pressure") * float(states["unit_slope"])
@@ -213,24 +210,23 @@ _SPAN = 5.0
 
 
 def draw_curves(
-    curves: Curves, panels: Mapping[Axes, Panel], *, unloading: bool = False, count: int | None = None
+    curves: Curves, panels: Mapping[Axes, Panel], *, unloading: bool = False
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Draw the curves of a study on double logarithmic axes.
-
-    Parameters
-    ----------
-    curves : the curves.
-    panels : what each panel shows.
-    unloading : True to draw unloading as well.
-    count : number of curves in the figure, if there are more than these.
-
-    Returns
-    -------
-    For each panel, loads and values of all points of loading.
-    """
+    """Draw the curves of a study on double logarithmic axes; return loads and values of all points of loading."""
     drawn = []
+    asperities = {curve.runs.contact: len(curve.runs.by_seed) for curve in curves.lines}
+    seeds = [(asperities.get(curve.runs.contact, 0), len(curve.runs.by_seed)) for curve in curves.crosses]
+    runs = [run for curve in (*curves.lines, *curves.crosses) for run in curve.runs.by_seed.values()]
+    say(
+        next(iter(panels)),
+        *(
+            f"{axes.get_title('left')} {quantity(panel.y).name.capitalize()} against the {quantity(panel.x).name}."
+            for axes, panel in panels.items()
+        ),
+        about_boundary_elements(runs, seeds),
+    )
     for axes, panel in panels.items():
-        points = [_draw_line(axes, line, panel, count or len(curves.lines)) for line in curves.lines]
+        points = [_draw_line(axes, line, panel, len(curves.lines)) for line in curves.lines]
         points += [_draw_crosses(axes, line, panel) for line in curves.crosses]
         drawn.append(tuple(map(np.concatenate, zip(*points, strict=True))))
         for line in curves.lines if unloading else ():
@@ -292,36 +288,3 @@ def draw_theory(
     inside = (x >= limits[0] / _BEYOND) & (x <= limits[1] * _BEYOND)
     plot(axes, x[inside], y[inside], name, **look)
     return y[inside]
-
-
-def say_models(figure: Figure, curves: Curves, where: str = "") -> None:
-    """Explain the symbols of the models in the caption, such as circles of the asperity model `where` in loading."""
-    groups = [curve.runs for curve in (*curves.lines, *curves.crosses)]
-    models = dict.fromkeys(group.model_name for group in groups)
-    several = {model: any(name.startswith(f"{model}, ") for name in curves.handles) for model in models}
-    if ASPERITIES_NAME in models:
-        shapes = "Circles and other shapes" if several[ASPERITIES_NAME] else "Circles"
-        say(figure, f"{shapes} are the asperity model{where}.")
-    if REFERENCE_NAME in models:
-        shapes = "Crosses and stars" if several[REFERENCE_NAME] else "Crosses"
-        of_asperities = {curve.runs.contact: len(curve.runs.by_seed) for curve in curves.lines}
-        counts = [(of_asperities.get(curve.runs.contact, 0), len(curve.runs.by_seed)) for curve in curves.crosses]
-        beside = f", {topographies(counts)}" if counts else ""
-        say(figure, f"{shapes} are boundary elements{where}{beside}.")
-    if select.FINITE_RANGE_NAME in models:
-        say(figure, f"Crosses with three arms are boundary elements at a finite range{where}.")
-    runs = (run for group in groups for run in group.by_seed.values())
-    say(figure, range_of_attraction(attractions_of(runs)))
-
-
-def topographies(counts: Sequence[tuple[int, int]]) -> str:
-    """Return words for the topographies of boundary elements; `counts` has the seeds of both models, for each curve."""
-    if fewer := sorted({truths for asperities, truths in counts if truths != asperities}):
-        seeds = " or ".join(map(str, fewer))
-        return f"on {seeds} of the topographies alone, so their means also differ by the seeds"
-    return "on the same topographies"
-
-
-def add_legend(figure: Figure, curves: Curves) -> None:
-    """Add a legend of the curves, and of everything that has a label in the panels."""
-    legend_below(figure, curves.handles, rows=curves.looks.slopes_per_surface)

@@ -25,23 +25,14 @@ _MEAN_MARKERS = 24
 _SEED_LINE = {"ls": "-", "lw": 0.5, "alpha": 0.5, "zorder": 1.6}
 _SEED_DOT = {"ls": "none", "marker": ".", "ms": 5, "mew": 0, "alpha": 0.5, "zorder": 2.5}
 _CROSS = {"ls": "none", "marker": "x", "mew": 0.7, "label": FEWER_SEEDS}
-_MEANS = "Results are means over the seeds (realisations of the surface)."
-# Legend entry, its look and the sentence of each kind of scatter.
-_BAND = (
-    "mean and 95 % band",
-    {"alpha": 0.35, "lw": 6, "solid_capstyle": "butt"},
-    """A band shows the 95 % confidence
-interval of the mean (Student's t), on a logarithmic axis of the logarithm.""",
-)
-_SEEDS = "single seeds beside their mean", _SEED_LINE, "Pale thin lines show the single seeds."
-_UNSEEN = "means over the seeds", {"ls": "none"}, ""
-_BARS = (
-    "mean and 95 % interval",
-    {"marker": "|", "ls": "none", "ms": 8},
-    """Bars are 95 % confidence intervals of the
-mean (Student's t), for positive quantities of the logarithm.""",
-)
-_RANGE = "mean and range", _BARS[1], "Bars are the range of the single seeds."
+_MEANS = """Results are means over the seeds (realisations of the surface). For five seeds or more, intervals are those
+of Student's t, for positive quantities of the logarithm."""
+# Legend entry of each kind of scatter, and its look.
+_BAND = "mean and 95 % band", {"alpha": 0.35, "lw": 6, "solid_capstyle": "butt"}
+_SEEDS = "single seeds beside their mean", _SEED_LINE
+_UNSEEN = "means over the seeds", {"ls": "none"}
+_BARS = "mean and 95 % interval", {"marker": "|", "ls": "none", "ms": 8}
+_RANGE = "mean and range", _BARS[1]
 
 
 def draw_members(
@@ -94,15 +85,9 @@ def _break_lines(known, *rows):
 def mark_fewer(
     axes: Axes, x: np.ndarray, y: np.ndarray, known: np.ndarray, look: dict, asked: int | np.ndarray, every: int = 1
 ) -> None:
-    """Draw a cross over each marker of a mean over fewer members than requested.
+    """Draw a cross over each marker of a mean `y` over fewer members than `asked`; arguments as of `draw_members`.
 
-    Parameters
-    ----------
-    x, y : (k,) float, the means.
-    known : (members, k) bool, True where a member has a value.
-    look : arguments of `Axes.plot` for the markers.
-    asked : number of requested members, for all points or for each point.
-    every : number of points from one marker to the next.
+    `known` is True where a member has a value; `every` is the number of points from one marker to the next.
     """
     counts = known.sum(axis=0)
     fewer = (counts > 0) & (counts < asked)
@@ -142,26 +127,18 @@ def _draw_scatter(axes, x, members, ends, colour, *, positive):
 
 
 def _explain(axes, kind, counts):
-    """Explain means over `counts` seeds and their scatter in the caption, and name them for the legend."""
-    words, look, sentence = kind
-    say(axes, _MEANS, sentence)
+    """Name means over `counts` seeds and their scatter in the legend, and explain them in the caption."""
+    words, look = kind
+    say(axes, _MEANS)
     count_seeds(axes, words, legend_handle(color=GREY, **look), counts)
 
 
 def join_bins(edges: np.ndarray, contents: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray]:
     """Join neighbouring bins until the content of every bin, summed over all members, is at least `least`.
 
-    Empty bins at both ends are left out. The last joined bin also contains the remaining bins.
-
-    Parameters
-    ----------
-    edges : (bins + 1,) float, edges of the bins.
-    contents : (members, bins) float, content of each bin (number or fraction).
-    least : smallest content of a joined bin.
-
-    Returns
-    -------
-    Edges of the k joined bins, (k + 1,); and contents of these bins divided by the bin width, (members, k).
+    `edges` has the shape (bins + 1,), `contents` (members, bins): numbers or fractions. Empty bins at both ends are
+    left out. The last joined bin also contains the remaining bins. Return the edges of the k joined bins, (k + 1,), and
+    the contents of these bins divided by the bin width, (members, k).
     """
     filled = np.flatnonzero(contents.any(axis=0))
     if not len(filled):
@@ -190,16 +167,9 @@ def draw_points(
 ) -> ErrorbarContainer:
     """Draw the means of an ensemble as points with confidence bars, or for few members with bars of their range.
 
-    A line joins two neighbouring points only if both points are means over the same members.
-
-    Parameters
-    ----------
-    x : (k,) or (members, k) float, positions on the x axis.
-    members : (members, k) float, values of every member; NaN where a member has no value.
-    positive : True if the values are positive; both ends of the bars are then positive too.
-    name : name of the curve in the table of the figure.
-    asked : number of requested members, for all points or for each; a mean over fewer members has a crossed-out marker.
-    shift : factor of the drawn positions, so that points at one position are side by side.
+    A line joins two neighbouring points only if both points are means over the same members. Parameters are those of
+    `draw_members`, but `x` may also have the shape (members, k), and `asked` may differ between points. `shift` is a
+    factor of the drawn positions, so that points at one position are side by side.
     """
     known, over = np.isfinite(members), ensemble(members)
     several, ends = over.count > 1, _ends(members, positive=positive, asked=asked)

@@ -51,16 +51,8 @@ class Series(NamedTuple):
 def select_series(campaign: xr.DataTree, study: str, *, only_jkr: bool = False) -> list[Series]:
     """Return the series of a study on free squares that unload, by increasing rms height.
 
-    If the study has boundary elements, the series are those of boundary elements.
-
-    Parameters
-    ----------
-    only_jkr : True to leave out runs without adhesion, without a radius, and on layers.
-
-    Raises
-    ------
-    NothingToDraw
-        If no run is complete and unloads, if no run is on a free square, or if all runs are left out.
+    If the study has boundary elements, the series are those of boundary elements. `only_jkr` leaves out runs without
+    adhesion, without a radius, and on layers. Raise `NothingToDraw` if no run is left.
     """
     # Only boundary elements compute shapes; both models compute free squares without a shape.
     unloaded = select.select_unloaded_runs(campaign, study, REFERENCE_MODEL)
@@ -149,11 +141,9 @@ def read_measured(
 ) -> list[Measured]:
     """Return the measurements that a figure shows, and name them in its caption.
 
-    Parameters
-    ----------
-    tables, measurements : path of each table; its `label`, `citation`, `columns` (headings and factors), `quantities`
-        (names by column), `material`, and `works` if the material is known.
-    needed, any_of : quantities that a shown measurement has; at least one of `any_of`, if any.
+    A measurement has a `label`, a `citation`, `columns` (headings and factors), `quantities` (names by column), a
+    `material`, and `works` if the material is known. A shown measurement has all quantities `needed`, and one of
+    `any_of`.
     """
     found, sources = [], []
     for k, (table, known) in enumerate(zip(tables, measurements, strict=True)):

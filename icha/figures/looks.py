@@ -12,7 +12,6 @@ from collections.abc import Iterable, Mapping, Sequence
 import matplotlib as mpl
 import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -50,8 +49,6 @@ FEW_LINES = 6
 # each material is narrower than the curve of the previous material. Thus coinciding curves are all visible.
 _BARE_SIZE, _ADHESIVE_SIZE, _LEAST_SIZE, _NARROWER = 6.0, 4.6, 1.8, 0.75
 _LINE_WIDTH = 0.22
-# Colour maps of the first surfaces, if several surfaces have several slopes.
-_HUES = ("Blues_r", "Oranges_r", "Greens_r")
 # Largest number of graded colours that a legend names.
 _MOST_NAMED = 9
 # Fraction of the original colour in a pale colour; the rest is white.
@@ -104,9 +101,10 @@ class Looks:
         self.by_place |= (len(self.materials) == 1 if by_place is None else by_place) and len(self.places) > 1
         coloured = self.places if self.by_place else self.materials
         self.many = len(coloured) > MOST_COLOURS
-        graded = self.many or self.by_place
-        if graded:
-            palette = _place_colours(self.places) if self.by_place else graded_colours(len(coloured))
+        if self.by_place and len({surface for surface, _ in self.places}) == len(self.places):
+            palette = distinct_colours(len(coloured))
+        elif self.by_place or self.many:
+            palette = graded_colours(len(coloured))
         else:
             palette = map(material_colours(campaign).get, coloured)
         self._colours = dict(zip(coloured, palette, strict=True))
@@ -197,14 +195,6 @@ class Looks:
         """Return the heading of a legend: the only material, if colours distinguish surfaces and slopes."""
         return self.material_name(self.materials[0]) if self.by_place and len(self.materials) == 1 else None
 
-    @property
-    def slopes_per_surface(self) -> int | None:
-        """Number of slopes of each of several surfaces that colours distinguish; None if there are no such surfaces."""
-        surfaces = [surface for surface, _ in self.places]
-        count = surfaces.count(surfaces[0])
-        alike = all(surfaces.count(surface) == count for surface in surfaces)
-        return count if self.by_place and alike and 1 < count < len(surfaces) else None
-
     def colour_handles(self) -> dict[str, Line2D]:
         """Return legend entries that show only colours: bars of some materials, or of some surfaces and slopes."""
         named, coloured = (self.place_name, self.places) if self.by_place else (self.material_name, self.materials)
@@ -288,29 +278,14 @@ def pale(look: dict, model: str) -> dict:
     return look | {"color": colour, "mec": colour, "label": label} | filling
 
 
-def graded_colours(count: int, name: str = "viridis", brightest: float = 0.9) -> list[str]:
-    """Return `count` colours of a colour map from dark (0) to `brightest` (at most 1), as hexadecimal text."""
-    return [to_hex(colour) for colour in mpl.colormaps[name](np.linspace(0, brightest, count))]
+def graded_colours(count: int) -> list[str]:
+    """Return `count` colours from dark to bright, as hexadecimal text."""
+    return [to_hex(colour) for colour in mpl.colormaps["viridis"](np.linspace(0, 0.9, count))]
 
 
 def distinct_colours(count: int) -> Sequence[str]:
     """Return the first colours of `COLOURS`; graded colours if there are too few."""
     return COLOURS[:count] if count <= MOST_COLOURS else graded_colours(count)
-
-
-def _place_colours(places):
-    """Return graded colours; if few surfaces have several slopes each, every surface has a hue.
-
-    Few surfaces without different slopes have the first colours.
-    """
-    surfaces = [surface for surface, _ in places]
-    if len(set(surfaces)) == len(places) <= MOST_COLOURS:
-        return distinct_colours(len(places))
-    hues = dict(zip(dict.fromkeys(surfaces), _HUES, strict=False))
-    if len(hues) < max(2, len(set(surfaces))) or len(hues) == len(places):
-        return graded_colours(len(places))
-    colours = {surface: iter(graded_colours(surfaces.count(surface), hue, 0.55)) for surface, hue in hues.items()}
-    return [next(colours[surface]) for surface in surfaces]
 
 
 def some_of(names: Sequence) -> list:
@@ -327,39 +302,26 @@ _MANY_NAMES = 12
 _MOST_COLUMNS = 4
 
 
-def legend_below(
-    figure: Figure, handles: Mapping[str, object], heading: str | None = None, *, rows: int | None = None
-) -> None:
+def legend_below(figure: Figure, handles: Mapping[str, object], heading: str | None = None) -> None:
     """Add a legend below the panels, in as many columns as fit, and with a heading.
 
     The legend has an entry for each handle, for the scatter of means (`icha.figures.ensembles`), and for everything
-    that has a label in a panel. If `rows` is given, columns have this number of rows if they fit. The legend increases
-    the height of the figure, and must therefore be added last.
+    that has a label in a panel. The legend increases the height of the figure, and must therefore be added last.
     """
-    named = named_handles(figure.axes)
+    named: dict[str, object] = {}
+    for axes in figure.axes:
+        for handle, name in zip(*axes.get_legend_handles_labels(), strict=True):
+            named.setdefault(name, handle)
     last = {name: named.pop(name) for name in (FEWER_SEEDS, NOT_APPLICABLE, COARSE_GRID) if name in named}
     handles = dict(handles) | scatter_handles(figure) | named | last
     look = {"loc": "outside lower center", "fontsize": 8 if len(handles) <= _MANY_NAMES else 7}
-    most, names, entries = _MOST_COLUMNS if handles else 0, list(handles), list(handles.values())
-    if rows and (needed := -(-len(names) // rows)) <= _MOST_COLUMNS:
-        most, empty = needed, needed * rows - len(names)
-        names, entries = names + [""] * empty, entries + [legend_handle(ls="none")] * empty
-    for columns in range(most, 0, -1):
-        legend = figure.legend(entries, names, ncols=columns, title=heading, **look)
+    for columns in range(_MOST_COLUMNS if handles else 0, 0, -1):
+        legend = figure.legend(handles.values(), handles.keys(), ncols=columns, title=heading, **look)
         size = legend.get_window_extent().size / figure.dpi
         if size[0] < figure.get_figwidth() or columns == 1:
             figure.set_figheight(figure.get_figheight() + size[1])
             break
         legend.remove()
-
-
-def named_handles(panels: Iterable[Axes]) -> dict[str, object]:
-    """Return the legend entries of everything that has a label in some panels."""
-    found: dict[str, object] = {}
-    for axes in panels:
-        for handle, name in zip(*axes.get_legend_handles_labels(), strict=True):
-            found.setdefault(name, handle)
-    return found
 
 
 def model_handle(name: str, **look: object) -> Line2D:

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -12,7 +12,6 @@ from matplotlib.ticker import MaxNLocator
 from icha.analysis.model_error import difference_of_contacts
 from icha.contact.model import EVENT_KINDS
 from icha.contact.models import MODELS, REFERENCE_MODEL
-from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of, symbol_of
 from icha.figures import select
 from icha.figures.captions import (
@@ -20,7 +19,6 @@ from icha.figures.captions import (
     grid_of_loops,
     only_spheres,
     range_of_attraction,
-    without_fit,
 )
 from icha.figures.curves import Panel, panel_in_units
 from icha.figures.drawn import Name, plot, record, say
@@ -28,7 +26,6 @@ from icha.figures.indenter_curves import read_measured, select_series, theory_cu
 from icha.figures.looks import (
     BRANCH_DASHES,
     MODEL_MARKERS,
-    REFERENCE_NAME,
     UNLOADING_MARKERS,
     Looks,
     legend_below,
@@ -65,28 +62,11 @@ _POINTS_BETWEEN = 8
 _PULL_OFF = {"ls": "none", "mec": "black", "mew": 0.7, "ms": 4.6, "zorder": 6}
 _TRUTH = {"ls": "none", "ms": 3.6, "mew": 0.7, "zorder": 5}
 _TRUTH_MARKERS = {"loading": MODEL_MARKERS, "unloading": UNLOADING_MARKERS}
-_TRUTH_WORDS = {
-    REFERENCE_NAME: """Crosses are boundary elements on the same topography, upright in loading and oblique in
-    unloading.""",
-    select.FINITE_RANGE_NAME: "Crosses with three arms are boundary elements at a finite range of attraction.",
-}
-
-
-class _Loop(NamedTuple):
-    """A run in loading and unloading.
-
-    Attributes
-    ----------
-    labels : labels of the run.
-    run : the run.
-    truths : runs with boundary elements on the same topography, with the same material.
-    look : arguments of `Axes.plot` for lines and markers.
-    """
-
-    labels: RunLabels
-    run: xr.Dataset
-    truths: list[xr.Dataset]
-    look: dict
+_LOOPS = """Load against mean separation (left), and contact area against load (right), on one topography, which the
+title names. Where loading and unloading coincide, contact is reversible. Tension is negative; pull-off is the largest
+tension in the last unloading. Sudden changes along a line are jumps of one or several spots. A straight line joins the
+states before and after a jump, as at both ends of a path, where the load is zero because there is no contact. The area
+between loading and unloading on the left is the energy lost per nominal area."""
 
 
 @in_style
@@ -101,11 +81,7 @@ def loops(
 ) -> Figure:
     """Draw the runs of all slopes and materials of a study on one topography.
 
-    Parameters
-    ----------
-    campaign : the campaign dataset.
-    surface, seed : labels of the topography. Default: surface and seed of the first complete run.
-    units : "reduced" or "physical"; smooth shapes are always in physical units.
+    Defaults are surface and seed of the first complete run. Smooth shapes are always in physical units.
     """
     runs = select.select_by_labels(select.select_unloaded_runs(campaign, study), surface=surface, seed=seed)
     others = select.select_runs(campaign, boundary_elements or study, ragged=False, model=REFERENCE_MODEL)
@@ -118,35 +94,21 @@ def loops(
     looks, drawn = Looks(campaign, [study], contacts, by_place=None), []
     for (labels, run), contact in zip(runs, contacts, strict=True):
         look = looks.look(contact, applicable=select.is_good_loop(run), model=labels.model)
-        beside = map(select.over_mean_separation, truths)
-        drawn.append(_Loop(labels, run, [each for each in beside if not difference_of_contacts(run, each)], look))
+        drawn.append((labels, run, [each for each in truths if not difference_of_contacts(run, each)], look))
 
     # A smooth shape has no roughness, whose height and slope are the reduced units.
     physical = units == "physical" or not any(float(run["rms_height"]) for _, run in runs)
     pressures, areas = _panels(campaign[study].to_dataset(), physical=physical)
     rows = [[slope] for slope in slopes] if own_rows else [slopes]
-    by_row = [[loop for loop in drawn if loop.labels.rms_slope in shown] for shown in rows]
+    by_row = [[loop for loop in drawn if loop[0].rms_slope in shown] for shown in rows]
     windows = [_small_tensions(loops_of_row, pressures) for loops_of_row in by_row]
     columns = 3 if any(windows) else 2
     fig, panels = new_panels(2.7 * len(rows), len(rows), columns)
-    load = "nominal pressure" if physical else "reduced pressure"
-    against = "mean separation" if physical else "mean separation divided by the rms height"
-    unit = "" if physical else ", multiplied by E* h'rms hrms,"
-    say(
-        fig,
-        f"""Loading (wide lines) and unloading (dashed lines) on one topography, which the title names: the
-        {load}{"" if physical else " F/(E* h'rms A0)"} against the {against} (left), and the contact area divided by the
-        nominal area against the {load} (right).""",
-        "The middle panel enlarges the region around zero load of the left panel." if columns > 2 else "",
-        """Where both lines coincide, contact is reversible. Tension is negative. Sudden changes along a line are jumps
-        of one or several spots. A straight line joins the states before and after a jump, as at both ends of a path,
-        where the load is zero because there is no contact.""",
-        f"The area between loading and unloading on the left{unit} is the energy lost per nominal area.",
-    )
+    say(fig, _LOOPS if physical else f"{_LOOPS} In reduced units, that energy is divided by E* h'rms h_rms.")
     for (left, *middle, right), shown_loops, window in zip(panels, by_row, windows, strict=True):
         for ax, panel in ((left, pressures), *((ax, pressures) for ax in middle), (right, areas)):
             for loop in shown_loops:
-                _draw(ax, loop, panel, turn=len(slopes) > 1)
+                _draw(ax, *loop, panel, turn=len(slopes) > 1)
             panel.label(ax, lowest=shown_loops is by_row[-1])
         for ax in middle:
             ax.axhline(0, color=GREY, lw=0.5, zorder=1)
@@ -157,13 +119,13 @@ def loops(
             ax.yaxis.set_major_formatter(lambda value, _: format_number(value))
             ax.set_ylabel(symbol_of(pressures.y) + (f" ({pressures.units[1]})" if physical else ""))
         if own_rows:
-            right.set_title(slope_label(shown_loops[0].labels.rms_slope), loc="right")
+            right.set_title(slope_label(shown_loops[0][0].rms_slope), loc="right")
     labels, _ = runs[0]
-    models = dict.fromkeys([labels.model, *(REFERENCE_MODEL for loop in drawn if loop.truths)])
+    models = dict.fromkeys([labels.model, *(REFERENCE_MODEL for _, _, beside, _ in drawn if beside)])
     title = " and ".join(MODELS[model].words for model in models)
     words = title, surface_label(campaign, labels.surface), f"seed {labels.seed}"
     fig.suptitle(", ".join(words), fontsize="medium")
-    shown = [run for loop in drawn for run in (loop.run, *loop.truths)]
+    shown = [each for _, run, beside, _ in drawn for each in (run, *beside)]
     studies = list(dict.fromkeys(filter(None, (study, boundary_elements))))
     say(fig, range_of_attraction(attractions_of(shown)), grid_of_loops(campaign, studies))
     legend_below(fig, _handles(looks, drawn, marked=len(rows[0]) > 1), looks.heading())
@@ -178,31 +140,32 @@ def _panels(dataset, *, physical):
     return loads, panel_in_units("nominal_pressure", "contact_area_fraction", dataset)
 
 
-def _draw(ax, loop, panel, *, turn):
-    """Draw a loop with a marker at pull-off; if `turn` is True, also mark the end of the first loading."""
-    run, colour, words = loop.run, loop.look["color"], select.name_of_model(loop.run)
+def _draw(ax, labels, run, truths, look, panel, *, turn):
+    """Draw a run with a marker at pull-off, and runs with boundary elements beside it.
+
+    If `turn` is True, also mark the end of the first loading.
+    """
+    colour, words = look["color"], select.name_of_model(run)
     for branch, leg in select.branches(run):
-        record(ax, *panel.points(leg), Name(f"{words}, {branch}", loop.labels))
+        record(ax, *panel.points(leg), Name(f"{words}, {branch}", labels))
         line = panel.points(leg) if panel.y == "contact_area_fraction" else _curve(leg, panel)
         ax.plot(*line, ls=BRANCH_DASHES[branch], color=colour, **_BRANCHES[branch])
     marked = [(np.flatnonzero(run["leg"] == 0)[-1], {"ls": "none", "zorder": 5})] if turn else []
     if turn:
         say(ax, "Symbols without an edge mark the end of the first loading.")
     if (at := select.pull_off_step(run)) is not None:
-        say(ax, "Symbols with a black edge mark pull-off, the largest tension in the last unloading.")
         marked.append((at, _PULL_OFF))
-    for step, look in marked:
-        ax.plot(*(values[step] for values in panel.points(run)), **loop.look | look)
-    for truth in loop.truths:
+    for step, mark in marked:
+        ax.plot(*(values[step] for values in panel.points(run)), **look | mark)
+    for truth in truths:
         name = select.name_of_model(truth)
-        say(ax, _TRUTH_WORDS[name])
         for branch, markers in _TRUTH_MARKERS.items():
             states = truth.isel(step=truth["branch"].values == branch)
-            look = {"color": colour, "marker": markers[name], **_TRUTH}
+            crosses = {"color": colour, "marker": markers[name], **_TRUTH}
             # The colour is already pale if the asperity model is not applicable.
-            look = look if select.is_good_loop(truth) or "label" in loop.look else pale(look, REFERENCE_MODEL)
-            of_truth = Name(f"{name}, {branch}", loop.labels._replace(model=REFERENCE_MODEL))
-            plot(ax, *panel.points(states), of_truth, markevery=_APART, **look)
+            crosses = crosses if select.is_good_loop(truth) or "label" in look else pale(crosses, REFERENCE_MODEL)
+            of_truth = Name(f"{name}, {branch}", labels._replace(model=REFERENCE_MODEL))
+            plot(ax, *panel.points(states), of_truth, markevery=_APART, **crosses)
 
 
 def _curve(leg, panel):
@@ -228,14 +191,14 @@ def _curve(leg, panel):
 
 def _small_tensions(drawn, panel):
     """Return the limits of separation and load around zero load, if the tension is small but not zero; else None."""
-    points = [panel.points(loop.run) for loop in drawn]
+    points = [panel.points(run) for _, run, *_ in drawn]
     pressures = np.concatenate([load for _, load in points])
     tension = -pressures.min()
     if not select.ROUNDING * pressures.max() < tension < _SMALL_TENSION * pressures.max():
         return None
     shown = []
-    for loop, (separation, load) in zip(drawn, points, strict=True):
-        near = (np.abs(load) <= _REACH * tension) & (loop.run["contact_area_fraction"].values > 0)
+    for (_, run, *_), (separation, load) in zip(drawn, points, strict=True):
+        near = (np.abs(load) <= _REACH * tension) & (run["contact_area_fraction"].values > 0)
         at = np.flatnonzero(near)
         # The first state after separation is shown as well.
         shown.append(separation[np.unique([*at, min(at[-1] + 1, len(near) - 1)])] if at.size else [])
@@ -257,9 +220,9 @@ def _handles(looks, loops, *, marked):
     handles = looks.handles(lw=4, ls="-", **({} if marked else {"marker": "none"}))
     for branch, dashes in BRANCH_DASHES.items():
         handles[branch] = legend_handle(color=GREY, ls=dashes, **_BRANCHES[branch])
-    if any(select.pull_off_step(loop.run) is not None for loop in loops):
+    if any(select.pull_off_step(run) is not None for _, run, *_ in loops):
         handles["pull-off"] = legend_handle(marker="o", mfc=GREY, **_PULL_OFF)
-    for name in dict.fromkeys(select.name_of_model(truth) for loop in loops for truth in loop.truths):
+    for name in dict.fromkeys(select.name_of_model(truth) for _, _, truths, _ in loops for truth in truths):
         for branch, markers in _TRUTH_MARKERS.items():
             handles[f"{name}, {branch}"] = legend_handle(color=GREY, marker=markers[name], **_TRUTH)
     return handles
@@ -275,14 +238,13 @@ _THEORIES = {
     "JKR, receding": {"color": GREY, "lw": 2.4, "alpha": 0.25},
     "Hertz": {"color": GREY, "lw": 0.9, "ls": ":"},
 }
-_THEORY_WORDS = {
-    "Hertz": """The dotted line is the theory of Hertz for a smooth sphere with the radius and the modulus of the runs
-    in the same panel.""",
-    "JKR": """The wide grey line is the theory of Johnson, Kendall and Roberts (JKR) for this sphere with the work of
-    adhesion of these runs, with the states that are unstable under load control, from the pull-off force to the
-    jump-off under displacement control.""",
-    "JKR, receding": "That line is for advancing edges; the paler one has the work of adhesion of receding edges.",
-}
+_INDENTATION = """Force against indentation. The indentation is the distance by which the apex of the shape without
+roughness has moved beyond the undeformed plane of the elastic body. Tension is negative. Every seed is a line of its
+own."""
+_SPHERES = """The theories of Hertz, and of Johnson, Kendall and Roberts (JKR), are for a smooth sphere with the radius,
+the modulus and the works of adhesion of the runs in the same panel. The line of JKR includes states that are unstable
+under load control, up to the jump-off under displacement control. Runs without adhesion have no line of JKR; shapes
+without a radius and layers have no line."""
 
 
 @in_style
@@ -303,19 +265,10 @@ def force_indentation(
     names = "indentation", "force"
     panel = panel_in_units(*names, *runs)
     limits = [_limits(values) for values in map(np.concatenate, zip(*map(panel.points, runs), strict=True))]
-    by_height = not any(each.contact for each in series)
-    together = len(series) <= _MOST_SERIES and by_height
+    together = len(series) <= _MOST_SERIES and not any(each.contact for each in series)
     shown = [series] if together else [[each] for each in series]
     fig, panels, columns = new_grid(len(shown), 2, 2.7, 3.55, least=1.3, sharex=True, sharey=True)
-    say(
-        fig,
-        """Force against indentation in loading (solid lines) and unloading (dashed lines). The indentation is the
-        distance by which the apex of the shape without roughness has moved beyond the undeformed plane of the elastic
-        body. Tension is negative. Every seed is a line of its own.""",
-        """Colours become brighter with the rms height of the roughness; runs without roughness are black."""
-        if by_height
-        else "",
-    )
+    say(fig, _INDENTATION)
     measured = read_measured(fig, tables, measurements, *names)
     points = [(panel.points(each.values), each) for each in measured]
     for axis, ends in enumerate(limits):
@@ -344,12 +297,7 @@ def force_indentation(
         ax.set_xlabel(label_of(panel.x, panel.units[0]))
     for ax in panels[::columns]:
         ax.set_ylabel(label_of(panel.y, panel.units[1]))
-    say(fig, *(_THEORY_WORDS[name] for name in ("Hertz", "JKR", "JKR, receding") if name in theories))
-    dataset = campaign[study].to_dataset()
-    if "JKR" in theories and (dataset["surface_energy"] == 0).any():
-        say(fig, "Runs without adhesion have no line of JKR.")
-    if theories and select.lacks_sphere(dataset):
-        say(fig, "Shapes without a radius and layers have neither line.")
+    say(fig, _SPHERES if theories else "")
     named = [] if len(shown) > 1 else series
     handles = {each.name: legend_handle(color=each.colour, **_LOOP) for each in named}
     handles |= {name: legend_handle(color=BLACK, ls=dashes, **_LOOP) for name, dashes in BRANCH_DASHES.items()}
@@ -371,10 +319,9 @@ last unloading up to the largest tension (b). Here F is the force, R the radius 
 of a circle with the true contact area. A smooth sphere with a Tabor parameter of 3 or more gives a straight line of
 slope 3/(4 E*), and the work of adhesion w follows from the value at F = 0, 3 sqrt(8 π E* w)/(4 E*). Markers are states
 of all seeds, at most one hundred of each run at equal steps of the indentation. States with F/a^(3/2) below -sqrt(8 π
-E* Δγ), where no sphere of JKR has contact (Δγ of receding edges), are not shown. Lines are fits of JKR with the given
-E* and R, one for each seed. A fit minimises the squared differences of a³ at given F, so states with a large radius
-have most weight. The legend gives the means over the seeds of the fitted work of adhesion."""
-_STANDING = "In unloading with two works of adhesion, states whose edge stands are neither drawn nor fitted."
+E* Δγ), where no sphere of JKR has contact (Δγ of receding edges), are not shown; in unloading with two works of
+adhesion, neither are states whose edge stands. A fit minimises the squared differences of a³ at given F, with the given
+E* and R, so states with a large radius have most weight. The legend gives means over the seeds."""
 
 
 @in_style
@@ -408,9 +355,7 @@ def jkr_plot(
                 drawn.append((branch, each, labels, run, x[inside], y[inside]))
     scale, unit = choose_unit(max(float(np.abs(x).max(initial=0.0)) for *_, x, _ in drawn), "N")
     fig, [panels] = new_panels(3.0, sharex=True, sharey=True)
-    dataset = campaign[study].to_dataset()
-    directed = bool((dataset["receding_energy"] > dataset["surface_energy"]).any())
-    say(fig, _LINE, _STANDING if directed else "", without_fit(dataset), only_spheres(dataset))
+    say(fig, _LINE, only_spheres(campaign[study].to_dataset()))
     for branch, each, labels, run, x, y in drawn:
         ax = panels[list(_TITLES).index(branch)]
         plot(ax, x * scale, y * 1e3, Name("states", labels), marker=_TITLES[branch][1], mec=each.colour, **_STATES)

@@ -13,10 +13,7 @@ from icha.surfaces.surface import Surface
 def draw_preparation(before: Surface, after: Surface) -> Figure:
     """Draw maps of a scan before and after its preparation, and both radial power spectra.
 
-    Parameters
-    ----------
-    before : square that is cut out of the scan, with filled points and without tilt.
-    after : prepared surface.
+    The surface `before` is the square that is cut out of the scan, with filled points and without tilt.
     """
     figure = new_figure(TWO_COLUMNS, 2.5)
     *maps, spectra = figure.subplots(1, 3)

@@ -1,19 +1,18 @@
 """Figures of sampled cases: share of the variance that each parameter causes (21), and a result against each (22)."""
 
-from collections.abc import Sequence
-
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
 from icha.contact.models import MODELS
 from icha.datasets import quantities
-from icha.datasets.quantities import state_words, symbol_of
+from icha.datasets.quantities import symbol_of
 from icha.figures.drawn import plot, record, say
 from icha.figures.looks import legend_below
 from icha.figures.select import NothingToDraw
 from icha.figures.style import BLUE, GREY, TWO_COLUMNS, VERMILLION, in_style, legend_handle, logarithmic_axes, new_grid
 from icha.support.formatting import choose_unit
+from icha.uncertainty.sensitivity import response_words
 
 # Thickness of a bar.
 _BAR = 0.36
@@ -27,6 +26,8 @@ _SHARES = (
 _DECADE = 5.0
 _CASE = {"ls": "none", "marker": "o", "ms": 3.2, "mfc": "none", "mec": BLUE, "mew": 0.7}
 _MEAN = "mean over the other parameters"
+_AGAINST = """A result of every sampled case against each sampled parameter. Means over the other parameters are from
+the polynomial of figure 21, between the 5 % and the 95 % quantile of the parameter."""
 
 
 @in_style
@@ -54,9 +55,9 @@ def sensitivity(sensitivity: xr.DataTree, *, study: str, target: int = -1) -> Fi
             values, widths = 100 * row[key].values, 100 * row[f"{key}_half_width"].values
             handles[words] = ax.barh(places + shift, values, _BAR, lw=0.8, **look)
             ends = np.clip([values - widths, values + widths], 0, 100)
-            record(ax, values, names, f"{_title(data, row)}, {words}", low=ends[0], high=ends[1])
+            record(ax, values, names, f"{response_words(data, row)}, {words}", low=ends[0], high=ends[1])
             ax.errorbar(values, places + shift, xerr=abs(ends - values), **_CAP)
-        ax.set_title(_title(data, row), loc="right", fontsize=8)
+        ax.set_title(response_words(data, row), loc="right", fontsize=8)
         ax.set(xlim=(0, 105), yticks=places, yticklabels=[symbol_of(name) for name in names])
         ax.tick_params(axis="y", length=0)
     for ax in panels[-columns:]:
@@ -78,22 +79,17 @@ def parameters(
         raise NothingToDraw(f"study {study}: no case has a result for {described.name}")
     row = shown.isel(response=0)
     number, fitted = int(row["response_target"]), int(row["degree"]) > 0
-    values = data[quantity].sel(model=_best_model(data["model"].values.tolist()))
+    values = data[quantity].sel(model=_best_model(data))
     values = np.exp(np.log((values if number < 0 else values.isel(target=number)).where(lambda v: v > 0)).mean("seed"))
     factor, unit = described.in_unit(float(row["middle"]))
     results = values.values * factor
     names = data["parameter"].values.tolist()
     size = {"row_height": 2.0, "column_width": TWO_COLUMNS / 3, "room": (0.0, 0.3), "least": 1.5}
     fig, panels, columns = new_grid(len(names), 3, **size, sharey=True)
-    say(fig, "A result of every sampled case against each sampled parameter.")
-    handles = {f"one case: {_title(data, row)}": legend_handle(**_CASE)}
+    say(fig, _AGAINST)
+    handles = {f"one case: {response_words(data, row)}": legend_handle(**_CASE)}
     if fitted:
         handles[_MEAN] = legend_handle(color=VERMILLION)
-        say(
-            fig,
-            """Lines: mean over the other parameters, from the polynomial of figure 21, between the 5 % and the 95 %
-            quantile of the parameter.""",
-        )
     for k, (ax, name) in enumerate(zip(panels, names, strict=True)):
         scale, label = _scale(data, name)
         plot(ax, data[name].values * scale, results, "case", **_CASE)
@@ -110,36 +106,17 @@ def parameters(
 
 
 def _responses(data: xr.Dataset, target: int) -> xr.Dataset:
-    """Return the results at one target and of the whole loop, for the model that is closest to the truth.
-
-    Raises
-    ------
-    NothingToDraw
-        If no case has a result there.
-    """
-    number = data.sizes["target"] - 1 if target < 0 else target
+    """Return the results at one target and of the whole loop, for the model that is closest to the truth."""
     if "response" not in data.dims:
         raise NothingToDraw(f"study {data.attrs['study']}: no case has a result")
-    models = data["response_model"].values.tolist()
-    shown = data["response_target"].isin((number, -1)) & (data["response_model"] == _best_model(models))
-    if not shown.any():
-        raise NothingToDraw(f"study {data.attrs['study']}: no case has a result at target {number}")
+    number = data.sizes["target"] - 1 if target < 0 else target
+    shown = data["response_target"].isin((number, -1)) & (data["response_model"] == _best_model(data))
     return data.isel(response=shown.values)
 
 
-def _best_model(models: Sequence[str]) -> str:
+def _best_model(data: xr.Dataset) -> str:
     """Return boundary elements if a study has them, otherwise the asperity model."""
-    return next(name for name in reversed(MODELS) if name in models)
-
-
-def _title(data: xr.Dataset, row: xr.Dataset) -> str:
-    """Return quantity and state of a result, such as `contact area at p* = 0.01`."""
-    number = int(row["response_target"])
-    words = quantities.quantity(str(row["response_quantity"].item())).name
-    if number < 0:
-        return words
-    kind, target = str(data["stop_kind"].values[number]), float(data["stop_target"].values[number])
-    return f"{words} at {state_words(kind, target)}"
+    return next(name for name in reversed(MODELS) if name in data["model"].values)
 
 
 def _scale(data: xr.Dataset, name: str) -> tuple[float, str]:

@@ -1,6 +1,5 @@
 """Select runs, snapshots and errors for a figure from the datasets of a campaign."""
 
-import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
@@ -17,11 +16,10 @@ from icha.datasets.campaign import (
     run_place,
     runs_of_status,
     select_run,
-    unit_height,
 )
-from icha.datasets.labels import LABELS, RunLabels, place_of, surfaces_and_slopes
+from icha.datasets.labels import LABELS, RunLabels, place_of
 from icha.datasets.quantities import quantity
-from icha.datasets.variables.campaign import COMPUTED_RUNS, LOADED_RUNS, MISSING, NOT_IN_DESIGN, RAGGED, WHOLE_RUNS
+from icha.datasets.variables.campaign import COMPUTED_RUNS, LOADED_RUNS, MISSING, RAGGED, WHOLE_RUNS
 from icha.figures.drawn import Name
 from icha.figures.style import format_number
 from icha.path.targets import LOADS, UNITS, UNLOADING
@@ -105,17 +103,10 @@ def group_by_contact(
 def select_runs(
     campaign: xr.DataTree, study: str, *, ragged: bool = True, model: str | None = None
 ) -> list[tuple[RunLabels, xr.Dataset]]:
-    """Return all complete runs of a study that use one model.
+    """Return all complete runs of a study that use one model: `model`, or by default the `shown_model` of the study.
 
-    Parameters
-    ----------
-    ragged : True to include spots and events of the runs; False is much faster.
-    model : name of the model. Default: the `shown_model` of the study.
-
-    Raises
-    ------
-    NothingToDraw
-        If no run of the `shown_model` is complete.
+    Spots and events of the runs are left out unless they are `ragged`, which is much slower. Raise `NothingToDraw` if
+    no run of the `shown_model` is complete.
     """
     dataset = campaign[study].to_dataset()
     wanted = model or shown_model(dataset)
@@ -128,7 +119,7 @@ def select_runs(
     if not ragged:
         campaign = xr.DataTree.from_dict({f"/{study}": dataset.drop_dims(RAGGED, errors="ignore")})
     runs = [(labels, select_run(campaign, labels)) for labels in found]
-    return [(labels, run.assign(reduced_separation=reduced_gap(run))) for labels, run in runs]
+    return [(labels, run.assign(reduced_gap=reduced_gap(run))) for labels, run in runs]
 
 
 def asked_seeds(study: xr.Dataset, labels: RunLabels) -> int:
@@ -147,21 +138,6 @@ def has_layer(study: xr.Dataset) -> bool:
     thickness, compression = study.get("layer_thickness"), study.get("layer_compression")
     free = thickness is not None and bool(np.isfinite(thickness).any())
     return free or (compression is not None and bool((np.abs(compression) > 0).any()))
-
-
-def lacks_sphere(study: xr.Dataset) -> bool:
-    """Return whether a study has surfaces without the radius of a sphere, or layers of finite thickness."""
-    radius, thickness = study.get("shape_radius"), study.get("layer_thickness")
-    return radius is None or bool(radius.isnull().any()) or bool(thickness is not None and np.isfinite(thickness).any())
-
-
-def lacks_fit(study: xr.Dataset) -> bool:
-    """Return whether a sphere with adhesion that was pulled off has no fit of JKR to loading or to unloading."""
-    pulled = study.get("pull_off_force_over_jkr")
-    if pulled is None:
-        return False
-    fits = [study.get(f"work_of_adhesion_{branch}") for branch in ("approach", "retraction")]
-    return any(fit is None or bool((pulled.notnull() & fit.isnull()).any()) for fit in fits)
 
 
 def is_applicable(run: xr.Dataset) -> bool:
@@ -191,10 +167,7 @@ def select_by_labels(
 ) -> list[tuple[RunLabels, xr.Dataset]]:
     """Return the runs with the wanted labels; None stands for the label of the first run.
 
-    Raises
-    ------
-    NothingToDraw
-        If no run has a wanted label. The message lists the labels of the runs.
+    Raise `NothingToDraw` if no run has a wanted label.
     """
     runs = list(runs)
     for name, value in wanted.items():
@@ -291,30 +264,6 @@ def snapshot_label(run: xr.Dataset, snapshot: int) -> str:
     return f"{branch}${quantity(kind).symbol}$ = {shown}"
 
 
-def select_errors(model_error: xr.DataTree, study: str) -> Iterator[tuple[tuple[str, str, float], xr.Dataset]]:
-    """Yield the model errors of a study along seeds and loads, for each material, surface and slope.
-
-    Parameters
-    ----------
-    model_error : dataset of `icha.analysis.model_error.model_error`.
-
-    Yields
-    ------
-    Material, surface and rms slope; and the dataset of the errors, with NaN if the study lacks this combination.
-    """
-    if study not in model_error.children:
-        return
-    errors = model_error[study].to_dataset().transpose("seed", ...)
-    for material, (surface, slope) in itertools.product(errors["material"].values, surfaces_and_slopes(errors)):
-        labels = {"surface": surface, "rms_slope": slope, "material": material}
-        yield (str(material), surface, slope), errors.isel(place_of(errors, labels))
-
-
-def compared_seeds(errors: xr.Dataset) -> int:
-    """Return the number of seeds that a comparison requests; `errors` is one dataset of `select_errors`."""
-    return int((errors["status"] != NOT_IN_DESIGN).sum("seed"))
-
-
 # --- runs that were unloaded ---
 
 # A tension counts as a rounding error if it is below this fraction of the largest pressure.
@@ -326,23 +275,12 @@ def select_unloaded_runs(
 ) -> list[tuple[RunLabels, xr.Dataset]]:
     """Return the runs of a study that unload, without spots and events; `model` is the preferred model, if any.
 
-    The reduced separation of these runs is the mean separation divided by the rms height, because the work is the
-    integral of the pressure over the mean separation. The mean gap of a free square differs from the mean separation.
-
-    Raises
-    ------
-    NothingToDraw
-        If no run is complete, or if no run unloads.
+    Raise `NothingToDraw` if no run is complete, or if no run unloads.
     """
     runs = _select_runs_with(unloading_legs, campaign, study, [model, None, REFERENCE_MODEL])
     if not runs:
         raise NothingToDraw(f"study {study}: no run reached its unloading; `icha run` prints where the runs ended")
-    return [(labels, over_mean_separation(run)) for labels, run in runs]
-
-
-def over_mean_separation(run: xr.Dataset) -> xr.Dataset:
-    """Return a run whose reduced separation is the mean separation divided by the rms height, also on a free square."""
-    return run.assign(reduced_separation=run["mean_separation"] / unit_height(run))
+    return runs
 
 
 def _select_runs_with(condition, campaign, study, models=(None, REFERENCE_MODEL)):
@@ -368,21 +306,14 @@ def select_detached_lines(
 ) -> dict[tuple[tuple[str, str, float | None], bool, str], list[ContactRuns]]:
     """Return the runs of some studies that were unloaded to complete separation, arranged as lines of points.
 
+    A key of the result has three parts: a tuple of material, surface and slope; the result of `is_good_loop`; and the
+    name of the model. Raise `NothingToDraw` if there is no line.
+
     Parameters
     ----------
     quantity : variable of the loop that the runs must have; a run that failed checks of its loss has no loss.
     along_slopes : True if a line joins points at several rms slopes. If False, every rms slope has its own line.
     both_models : True to add boundary elements to runs of another model.
-
-    Returns
-    -------
-    For each line, the runs at every point. A key has three parts: a tuple of material, surface and slope; the result of
-    `is_good_loop`; and the name of the model.
-
-    Raises
-    ------
-    NothingToDraw
-        If no run was unloaded to complete separation, or if no run of a study is complete.
     """
 
     def has_quantity(run):

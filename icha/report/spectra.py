@@ -11,8 +11,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from icha.figures.looks import MOST_COLOURS, graded_colours, legend_below, named_handles, some_of
-from icha.figures.style import COLOURS, TWO_COLUMNS, in_style, logarithmic_axes, new_figure
+from icha.figures.looks import distinct_colours, legend_below, some_of
+from icha.figures.style import TWO_COLUMNS, in_style, logarithmic_axes, new_figure
 
 LEAST_POWER = 1e-16  # powers below this fraction of the largest power are rounding errors
 
@@ -39,16 +39,15 @@ def picture_of_spectra(surfaces: Iterable[xr.Dataset]) -> str | None:
 @in_style
 def draw_spectra(members: Mapping[str, Sequence[xr.Dataset]]) -> Figure:
     """Draw the mean power spectrum of each surface; if there are many surfaces, the legend names only some of them."""
-    colours = graded_colours(len(members)) if len(members) > MOST_COLOURS else COLOURS
     named = some_of(list(members))
     figure = new_figure(TWO_COLUMNS, 3.4)
     axes = figure.subplots()
-    for (name, seeds), colour in zip(members.items(), colours, strict=False):
+    for (name, seeds), colour in zip(members.items(), distinct_colours(len(members)), strict=True):
         q = seeds[0]["psd_wavevector"].values
         power = np.mean([seed["power_spectrum"].values for seed in seeds if seed["psd_wavevector"].shape == q.shape], 0)
         visible = (q > 0) & (power > power.max() * LEAST_POWER)
         axes.plot(q[visible], power[visible], color=colour, label=name if name in named else None)
     logarithmic_axes(axes)
     axes.set(xlabel="wave number  $q$ (rad/m)", ylabel="power spectrum  $C(q)$ (m$^4$)")
-    legend_below(figure, named_handles([axes]))
+    legend_below(figure, {})
     return figure

@@ -124,7 +124,7 @@ def test_separations_of_a_free_square_are_compared_by_its_mean_gap():
         {
             "reduced_separation": (("surface", "step"), [[2.0, 1.0], [-1.0, -2.0]]),
             "mean_gap": (("surface", "step"), [[4e-6, 2e-6], [3e-6, 1e-6]]),
-            "rms_height": ("surface", [2e-6, 1e-6]),
+            "unit_height": ("surface", [2e-6, 1e-6]),
             "boundary": ("surface", ["periodic", "free"]),
         }
     )

@@ -343,7 +343,7 @@ def test_fig10_shows_means_and_seeds_of_the_errors_in_per_cent():
 
 def test_errors_of_runs_that_all_failed_are_nothing_to_draw():
     empty = {
-        f"/{name}": (node.to_dataset().drop_vars(["applicability", "attraction"]) * np.nan).assign_attrs(node.attrs)
+        f"/{name}": node.to_dataset().map(lambda each: each * np.nan if each.dtype.kind == "f" else each)
         for name, node in compared.errors().children.items()
     }
     with pytest.raises(NothingToDraw, match="study one: no run that was compared with boundary elements is complete"):
@@ -487,16 +487,15 @@ def caption_of_fig2(study, **data):
 def test_captions_state_only_what_the_figure_contains():
     tree = small.tree()
     bare = caption_of_fig2("slopes", campaign=tree)
-    assert "Open shapes are without adhesion." in bare and "boundary elements" not in bare
-    assert "Results are means" not in bare and "Thin dashed" not in bare and "theories" not in bare
-    assert "Ratio of contact area and load (a)" in bare and "mean separation divided by rms height (b)" in bare
-    seeds = caption_of_fig2("single", campaign=tree)
-    assert "Results are means over the seeds" in seeds and "Pale thin lines" in seeds and "A band" not in seeds
+    assert "Results are means" not in bare and "Thin dashed" not in bare and "Theories" not in bare
+    assert "Boundary elements" not in bare
+    assert "(a) Contact area over load against the reduced pressure. (b) Mean separation against" in bare
+    assert "Results are means over the seeds" in caption_of_fig2("single", campaign=tree)
     both = caption_of_fig2("one", campaign=compared.tree_of_both())
-    assert "Panels (c) and (d) show" in both and "Open shapes" in both and "three arms" not in both
+    assert "Panels (c) and (d) show" in both
     assert "in the limit of a short range" in both and "range of attraction of the material" not in both
     finite = caption_of_fig2("one", campaign=compared.tree_at_finite_range())
-    assert "three arms" in finite and "range of attraction of the material, which the grid resolves" in finite
+    assert "range of attraction of the material, which the grid resolves" in finite
 
 
 def test_fig2_compares_the_estimate_from_bare_runs_with_adhesive_boundary_elements():

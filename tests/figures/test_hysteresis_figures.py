@@ -14,7 +14,6 @@ from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of
 from icha.figures import against_parameter, contact_maps, loops
 from icha.figures.against_parameter import PARTS, fit_line, shares
-from icha.figures.drawn import caption_of
 from icha.figures.ensembles import Points
 from icha.figures.select import ContactRuns, select_unloaded_runs
 
@@ -196,20 +195,6 @@ def test_fig14_shows_boundary_elements_beside_asperities():
     assert {"asperities", "boundary elements"} < set(legend(figure))
 
 
-@pytest.mark.parametrize("module", [against_parameter.pull_off, against_parameter.loss])
-def test_captions_name_the_models_that_are_drawn(module):
-    runs = separate.study("one", materials=("sticky",))
-    truths = [(labels._replace(model=REFERENCE_MODEL), run) for labels, run in runs]
-    words = []
-    for drawn in (runs, truths, runs + truths):
-        tree = separate.tree(drawn)
-        words.append(caption_of(draw(module, tree, "one")))
-    alone, truth, both = words
-    assert "All symbols are the asperity model" in alone and "All symbols are boundary elements" in truth
-    assert "Crosses" in both and "other symbols" in both and "All symbols" not in both
-    assert not [text for text in (alone, truth) if "Crosses" in text or "causes are those of the asperity" in text]
-
-
 def test_a_straight_line_and_a_power_law_are_found_exactly():
     x = np.array([0.01, 0.03, 0.04, 0.1])
     values, r_squared, _ = fit_line(x, 0.7 * x - 0.002, np.array([0.0, 1.0]))
@@ -287,7 +272,6 @@ def test_fig15_parts_are_of_either_sign_and_make_up_the_whole(tree):
     heights = sorted((bar.get_y(), bar.get_y() + bar.get_height()) for bar in figure.axes[1].patches)
     np.testing.assert_allclose(heights, [(0, -20), (0, 60), (60, 80)])
     assert {"jump-in", "jump-off", "coalescence"} <= set(legend(figure))
-    assert "parts by coalescence are energy gained" in caption_of(figure) and "unattributed" not in caption_of(figure)
     assert not {"unattributed", "jumps at constant load"} & set(legend(figure))
 
     # Of the exact loops everything is explained by jumps, at the largest load of every line.
