@@ -17,6 +17,14 @@ from icha.support.input_files import problem_with_path
 
 # Limits of a file: number of bytes, of values after expansion of aliases, of nested sections, of characters per number.
 _MOST_BYTES, _MOST_VALUES, _DEEPEST, _LONGEST_NUMBER = 10**6, 10**6, 50, 100
+# What a message of the YAML parser means; `{}` is the line where the text or the brackets begin.
+_MEANINGS = {
+    r"found character '\\t'": "a tab; YAML allows only spaces in front of a key",
+    r"expected ',' or '[]}]'": "a bracket from line {} is not closed, or a comma is missing",
+    "2002:merge": "the key <<; write values that several entries share in the section `defaults`",
+    "mapping values are not allowed": "a second colon; put text with a colon into quotes, and a key on its own line",
+    "unexpected end of stream": "the quotes from line {} are not closed",
+}
 
 
 @dataclass(frozen=True)
@@ -98,7 +106,9 @@ def read_source(path: Path, overrides: Mapping = {}) -> Source:
     except yaml.reader.ReaderError as error:
         line, problem = text.count("\n", 0, error.position) + 1, f"control character {error.character:#04x}"
     except yaml.MarkedYAMLError as error:
-        line, problem = error.problem_mark.line + 1, _in_words(error)
+        line, begin = error.problem_mark.line + 1, (error.context_mark or error.problem_mark).line + 1
+        meanings = (words for pattern, words in _MEANINGS.items() if re.search(pattern, error.problem))
+        problem = next(meanings, error.problem).format(begin)
     except RecursionError:
         problem = _TOO_DEEP
     if problem:
@@ -108,23 +118,6 @@ def read_source(path: Path, overrides: Mapping = {}) -> Source:
         what = "empty" if content is None else f"a {type(content).__name__}"
         raise ConfigurationError(f"{path}: the file is {what}; expected a YAML mapping of keys to values")
     return Source(str(path), merge(content, overrides), overrides, node)
-
-
-# What a message of the YAML parser means; `{}` is the line where the text or the brackets begin.
-_MEANINGS = {
-    r"found character '\\t'": "a tab; YAML allows only spaces in front of a key",
-    r"expected ',' or '[]}]'": "a bracket from line {} is not closed, or a comma is missing",
-    "2002:merge": "the key <<; write values that several entries share in the section `defaults`",
-    "mapping values are not allowed": "a second colon; put text with a colon into quotes, and a key on its own line",
-    "unexpected end of stream": "the quotes from line {} are not closed",
-}
-
-
-def _in_words(error):
-    """Return the problem of a YAML error in words for authors of configurations."""
-    begin = (error.context_mark or error.problem_mark).line + 1
-    meanings = (words for pattern, words in _MEANINGS.items() if re.search(pattern, error.problem))
-    return next(meanings, error.problem).format(begin)
 
 
 def _read_text(path: Path) -> str:

@@ -24,23 +24,17 @@ from icha.surfaces.measured.settings import LINE_SCAN, Preparation, UnfitTopogra
 from icha.surfaces.measured.text_files import format_of_text, read_matrix, read_xyz
 from icha.surfaces.measured.text_tables import SourceFile
 
+# Reader of each format, and its library if the arrays of a file have names. A library is imported before the memory is
+# limited, so its own memory does not count.
 READERS = {
-    "npy": read_npy,
-    "npz": read_npz,
-    "matlab": read_matlab,
-    "netcdf": read_netcdf,
-    "matrix": read_matrix,
-    "xyz": read_xyz,
-    "hdf5": read_hdf5,
-    "instrument": read_instrument,
-}
-# Libraries of the readers. They are imported before the memory is limited, so their own memory does not count.
-_LIBRARIES = {
-    "npz": "numpy",
-    "matlab": "scipy.io",
-    "netcdf": "netCDF4",
-    "hdf5": "h5py",
-    "instrument": "SurfaceTopography",
+    "npy": (read_npy, None),
+    "npz": (read_npz, "numpy"),
+    "matlab": (read_matlab, "scipy.io"),
+    "netcdf": (read_netcdf, "netCDF4"),
+    "matrix": (read_matrix, None),
+    "xyz": (read_xyz, None),
+    "hdf5": (read_hdf5, "h5py"),
+    "instrument": (read_instrument, "SurfaceTopography"),
 }
 # Largest relative difference of the proportions of a scan by its size and by its coordinates.
 _PROPORTIONS = 1e-2
@@ -161,7 +155,7 @@ def _read(path, settings):
             refuse_traps(path)
             if name == "auto":
                 name = "xyz" if settings.columns else guess_format(path)
-            library = _LIBRARIES.get(name)
+            library = None if name == "text" else READERS[name][1]
             if name in ("text", "matrix") and (file.layout is None or file.layout.heading):
                 library = "SurfaceTopography"
         if library is not None:
@@ -169,7 +163,7 @@ def _read(path, settings):
         with bounded_memory():
             if name == "text":
                 name = format_of_text(file)
-            found = READERS[name](file, settings)
+            found = READERS[name][0](file, settings)
     except UnfitTopography:
         raise
     except RefusedFile as error:
@@ -180,7 +174,7 @@ def _read(path, settings):
             f"cannot be read{as_format}: the file is damaged or of another format; expected a sound file, or another "
             "`format`"
         ) from None
-    if settings.data is not None and name not in _LIBRARIES:
+    if settings.data is not None and READERS[name][1] is None:
         raise UnfitTopography(
             f"is given, but a file of format {name} has one array without a name. Remove the key", "data"
         )
