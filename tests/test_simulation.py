@@ -195,7 +195,7 @@ def test_arguments_with_a_wrong_unit_give_a_warning():
         simulate(lens, BARE, Path(contact_radii=[2e-4]), model="boundary_elements")
 
 
-@pytest.mark.parametrize("model", ["asperities", "boundary_elements"])
+@pytest.mark.parametrize("model", [pytest.param("asperities", marks=pytest.mark.slow), "boundary_elements"])
 def test_snapshots_at_states_of_the_last_unloading(model):
     surface = SelfAffineSpectrum(PERIOD, 0.4 * PERIOD, 0.25 * PERIOD, 0.8, rms_slope=0.3).realise(32, 1)
     material = Material(1e6, 2e-3)

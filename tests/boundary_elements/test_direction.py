@@ -92,6 +92,7 @@ def test_the_loss_is_the_front_and_the_jumps(sphere):
     assert not run.attrs.get("failed_checks") and not run.attrs.get("failed_loss_checks")
 
 
+@pytest.mark.slow
 def test_a_small_contact_pulls_off_like_a_punch():
     # With ten times the work, the front of a small contact never recedes before the tension is largest (Kendall 1971).
     run = loop(cells=14, ratio=10, deep=2.0)

@@ -58,6 +58,7 @@ def test_johnson_s_wave_from_first_touch_to_full_contact_and_out():
     )
 
 
+@pytest.mark.slow
 def test_without_adhesion_contact_closes_at_the_largest_tension_of_full_contact():
     surface = rough(48, 6)
     contact = contact_of(surface, HARD)

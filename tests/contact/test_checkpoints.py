@@ -40,7 +40,7 @@ def followed(monkeypatch, case, folder, most):
     return dataset, count
 
 
-@pytest.mark.parametrize("case", PATHS)
+@pytest.mark.parametrize("case", ["unloading", "areas", pytest.param("a failure", marks=pytest.mark.slow)])
 def test_a_path_that_was_stopped_goes_on_to_the_same_last_bit(monkeypatch, case, tmp_path):
     whole, needed = followed(monkeypatch, case, None, None)
     # The target of this path lies inside a jump.

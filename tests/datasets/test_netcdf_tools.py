@@ -11,8 +11,9 @@ from icha.datasets.labels import LABELS
 
 @pytest.fixture(scope="module")
 def paths(smoke):
-    """Every netCDF file of the campaign, which has all kinds of them."""
-    return sorted(path for path in (smoke / "results/smoke").rglob("*.nc") if "publish" not in path.parts)
+    """The netCDF files of the campaign, which has all kinds of them, but for those of sampled cases."""
+    files = sorted((smoke / "results/smoke").rglob("*.nc"))
+    return [path for path in files if "publish" not in path.parts and "-case" not in str(path)]
 
 
 def groups_of(data):

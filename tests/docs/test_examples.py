@@ -12,7 +12,7 @@ from icha.datasets.files import read_campaign
 EXAMPLES = Path(__file__).parents[2] / "docs/examples"
 OF_CAMPAIGNS = {"read_campaign", "own_figure"}
 # Scripts that take a second or more.
-LONG = {"loop", "finite_range", "interval", "area_and_separation", "lens"}
+LONG = {"sphere", "loop", "finite_range", "interval", "area_and_separation", "lens"}
 # For each script a variable, its value, and the largest relative difference.
 NUMBERS = {
     "sphere": ("ratio", 1, 0.01),  # JKR

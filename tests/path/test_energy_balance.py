@@ -12,10 +12,11 @@ from scipy.optimize import brentq
 
 import icha
 from icha import Material, Path
-from icha.contact.model import COALESCENCE, JUMP_IN, JUMP_OFF, Events
+from icha.contact.model import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, Events
 from icha.path import step_accuracy
 from icha.path.energy_balance import EnergyBalance, Step
 from icha.path.targets import DEFAULT_STEP
+from icha.surfaces.summits import find_summits
 
 LOSSES = ("by_jump_in", "by_jump_off", "by_coalescence", "by_load_jump")
 
@@ -175,6 +176,27 @@ def test_work_is_stored_or_lost_at_every_step(which):
     for name, count in (("by_jump_in", run.jump_in_count), ("by_jump_off", run.jump_off_count)):
         changed = np.diff(run[f"dissipated_{name}"]) != 0
         assert np.all(np.diff(count)[changed] > 0)
+
+
+def test_the_log_of_events_agrees_with_the_counts():
+    run = few.united_run()
+    assert int(run.coalescence_count[-1]) > 0 and int(run.split_count[-1]) > 0
+    assert run.event_kind.attrs["flag_meanings"].split() == ["jump_in", "jump_off", "coalescence", "split"]
+    counts = ("jump_in_count", "jump_off_count", "coalescence_count", "split_count")
+    for kind, name in zip((JUMP_IN, JUMP_OFF, COALESCENCE, SPLIT), counts, strict=True):
+        logged = np.bincount(run.event_step[run.event_kind == kind], minlength=run.sizes["step"])
+        np.testing.assert_array_equal(np.cumsum(logged), run[name])
+    assert np.all(np.diff(run.event_step) >= 0)
+    np.testing.assert_array_equal(run.event_separation, run.mean_separation[run.event_step.values])
+    # Single asperities jump in where they are, each once in one loading.
+    surface, _ = few.small()
+    summits = find_summits(surface).position
+    inward = run.event_kind.values == JUMP_IN
+    where = np.stack([run.event_x.values, run.event_y.values], axis=1)[inward]
+    assert np.all(run.event_members.values[inward] == 1)
+    nearest = np.min(np.linalg.norm(where[:, None] - summits, axis=2), axis=1)
+    assert len(where) and np.all(nearest < 1e-12)
+    assert len(np.unique(where, axis=0)) == len(where)
 
 
 @pytest.mark.slow

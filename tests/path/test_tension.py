@@ -44,7 +44,7 @@ def test_unloading_meets_the_same_tensions_again():
     )
 
 
-@pytest.mark.parametrize("model", ["asperities", "boundary_elements"])
+@pytest.mark.parametrize("model", [pytest.param("asperities", marks=pytest.mark.slow), "boundary_elements"])
 def test_tensions_on_a_rough_surface_lie_where_the_load_of_the_first_loading_rises_to_them(model):
     spectrum = icha.SelfAffineSpectrum(
         period=100e-6, rolloff_wavelength=50e-6, short_wavelength=25e-6, hurst=0.8, rms_slope=0.3

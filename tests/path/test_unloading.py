@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 
 import icha
 from icha import Material, Path
-from icha.contact.model import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, events_between
+from icha.contact.model import COALESCENCE, JUMP_OFF, SPLIT, events_between
 from icha.contact.models import PathAccuracy
 from icha.path.step_accuracy import StepAccuracy
 from icha.path.targets import LOAD_CONTROL
@@ -246,27 +246,6 @@ def test_a_union_splits_where_it_was_made():
     assert few.HEIGHT - [w.state for w in waypoints if len(w.state.spots)][-1].separation == pytest.approx(
         few.JUMP_OFF_APPROACH, abs=1e-5
     )
-
-
-def test_the_log_of_events_agrees_with_the_counts():
-    run = few.united_run()
-    assert int(run.coalescence_count[-1]) > 0 and int(run.split_count[-1]) > 0
-    assert run.event_kind.attrs["flag_meanings"].split() == ["jump_in", "jump_off", "coalescence", "split"]
-    counts = ("jump_in_count", "jump_off_count", "coalescence_count", "split_count")
-    for kind, name in zip((JUMP_IN, JUMP_OFF, COALESCENCE, SPLIT), counts, strict=True):
-        logged = np.bincount(run.event_step[run.event_kind == kind], minlength=run.sizes["step"])
-        np.testing.assert_array_equal(np.cumsum(logged), run[name])
-    assert np.all(np.diff(run.event_step) >= 0)
-    np.testing.assert_array_equal(run.event_separation, run.mean_separation[run.event_step.values])
-    # Single asperities jump in where they are, each once in one loading.
-    surface, _ = few.small()
-    summits = find_summits(surface).position
-    inward = run.event_kind.values == JUMP_IN
-    where = np.stack([run.event_x.values, run.event_y.values], axis=1)[inward]
-    assert np.all(run.event_members.values[inward] == 1)
-    nearest = np.min(np.linalg.norm(where[:, None] - summits, axis=2), axis=1)
-    assert len(where) and np.all(nearest < 1e-12)
-    assert len(np.unique(where, axis=0)) == len(where)
 
 
 def test_an_edge_of_contact_within_the_accuracy_of_the_solver_is_passed():
