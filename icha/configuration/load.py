@@ -197,10 +197,8 @@ INPUTS = "inputs"
 def collect_inputs(configuration: Configuration) -> tuple[str, dict[str, str]]:
     """Return the text of a configuration with paths in the folder `inputs`, and the files to copy to this folder.
 
-    Returns
-    -------
-    text : the configuration, in which files have the paths `inputs/<section>/<entry>/<name>`.
-    files : original path of each file, by the new path in `text`. Surfaces that no study uses are left out.
+    The new paths are `inputs/<section>/<entry>/<name>`. The second result maps the new paths to the original paths;
+    surfaces that no study uses are left out.
     """
     campaign = configuration.campaign
     # Variants of a surface have the same file as the original.

@@ -67,12 +67,7 @@ MEASURED = "measured"
 
 
 class RmsHeight(NamedTuple):
-    """Rms height to which a surface is scaled.
-
-    Attributes
-    ----------
-    metres : rms height, m.
-    """
+    """Rms height to which a surface is scaled, m."""
 
     metres: float
 
@@ -370,11 +365,7 @@ class Study(Section):
     ) -> Iterator[Problem]:
         """Yield the problems that prevent the study from running.
 
-        Parameters
-        ----------
-        pressure_unit : smallest E* h'rms of all contacts, Pa; infinite if it is unknown.
-        force_unit : smallest E* A0 h'rms of all contacts, N; infinite if it is unknown.
-        side : side of the smallest surface, m; infinite if it is unknown.
+        The arguments are those of `Campaign.units_of`; they are infinite if they are unknown.
         """
         alone, by_summits = self.models == [DEFAULT_MODEL], DEFAULT_MODEL in self.models
         # At a given load, the smallest slope has the largest reduced pressure. Smooth surfaces have the slope 0.

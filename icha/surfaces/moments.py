@@ -147,11 +147,8 @@ def radial_power_spectrum(surface: Surface) -> tuple[np.ndarray, np.ndarray, np.
     The integral of C over the plane of wave vectors is the mean square height. The first ten rings are 2 pi/L wide; the
     width of each later ring is a tenth of its wave number. The last ring ends at the largest circle in the grid of wave
     vectors. The heights of a free square are first multiplied by Hann's window, because a step between opposite edges
-    would add waves. C is then divided by the mean square of the window.
-
-    Returns
-    -------
-    mean wave numbers q of the rings (rad/m), C(q) (m^4), and wave numbers at the edges of the rings (rad/m).
+    would add waves. C is then divided by the mean square of the window. Return the mean wave numbers q of the rings
+    (rad/m), C(q) (m^4), and wave numbers at the edges of the rings (rad/m).
     """
     last, edges = (surface.grid - 1) // 2, [0.5]
     while edges[-1] < last:

@@ -75,17 +75,13 @@ class IsotropicSpectrum:
         return math.sqrt(2 * self.plateau * float(np.sum(self._shape(k))) * q**2)
 
     def realise(self, grid: int, seed: int, amplitudes: str = "fixed") -> Surface:
-        """Generate a random periodic surface with this spectrum by spectral synthesis with random phases.
+        """Generate a random periodic surface of zero mean height by spectral synthesis with random phases.
 
         Parameters
         ----------
         grid : nodes along a side; fewer than 2 per shortest wavelength raise an error, fewer than 4 cause a warning.
         seed : seed of the random phases, a non-negative integer.
         amplitudes : "fixed": each seed has the rms height and slope of the spectrum; "gaussian": random amplitudes.
-
-        Returns
-        -------
-        Surface of zero mean height.
 
         Raises
         ------

@@ -94,13 +94,7 @@ class Asperities:
 
 
 def find_summits(surface: Surface) -> Asperities:
-    """Find the summits of a surface with `locate_summits`; raise ValueError if there are none.
-
-    Raises
-    ------
-    ValueError
-        If the surface has no summit with negative-definite curvature, or if its nodes support none of its summits.
-    """
+    """Find the summits of a surface with `locate_summits`; raise ValueError if there are none with support by nodes."""
     found = locate_summits(surface)
     if len(found):
         return found
@@ -125,11 +119,7 @@ def locate_summits(surface: Surface) -> Asperities:
     square. Point reflection continues the heights at these edges, and only summits between the outermost nodes count.
 
     The spline rises above the surface near steps, pits, single pixels and plateaus. A maximum is a summit only if the
-    nodes around it support its height (`_is_supported`).
-
-    Returns
-    -------
-    Asperities in the order of their start nodes; there may be none.
+    nodes around it support its height (`_is_supported`). Asperities have the order of their start nodes.
     """
     spacing, margin = surface.spacing, _MARGIN if surface.free else 0
     heights = _finite_profile(surface)
@@ -297,20 +287,17 @@ def paraboloid_departure(
 ) -> float:
     """Measure how much the surface differs from the paraboloids of its summits at the edges of the contact spots.
 
-    Near the top of an elongated summit, the depth is a^2/2 times the arithmetic mean of the principal curvatures, while
-    1/R is their geometric mean. The function computes the result with both means, and returns the smaller result.
+    With the mean depth d of the surface, a cubic spline, below the summit on the circle of radius a, the result is the
+    mean of abs(ln(d / (a^2 / 2R))) over the spots, weighted by their areas; 0 if the radius of every spot is below a
+    quarter of a cell. Near the top of an elongated summit, the depth is a^2/2 times the arithmetic mean of the
+    principal curvatures, while 1/R is their geometric mean. The function computes the result with both means, and
+    returns the smaller result.
 
     Parameters
     ----------
-    surface : the surface, interpolated between its nodes by a cubic spline.
     position : (k, 2) float, centres of the spots (x, y), m.
     contact_radius : (k,) float, radius a of each spot, m.
     radius_of_curvature : (k,) float, radius of curvature R of each summit, m.
-
-    Returns
-    -------
-    float, the mean of abs(ln(d / (a^2 / 2R))) over the spots, weighted by their areas, with the mean depth d of the
-    surface below the summit on the circle of radius a; 0 if the radius of every spot is below a quarter of a cell.
     """
     large = contact_radius >= _SMALLEST_SPOT * surface.spacing
     if not large.any():

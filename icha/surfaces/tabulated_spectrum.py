@@ -445,16 +445,13 @@ def isotropic_from_profile(q: Sequence[float], one: Sequence[float]) -> np.ndarr
     Each row contains all waves of the surface with at least this wave number, C1D(q) = 2 int_0^inf C(sqrt(q^2 + s^2))
     ds. This is an Abel transform; its inverse is C(q) = -1/pi int_q^inf C1D'(k)/sqrt(k^2 - q^2) dk, in which
     k = q cosh(u). Between two rows, C1D is a power law. That of the last two rows continues behind the last row, so
-    waves beyond the table are not added to the rows.
+    waves beyond the table are not added to the rows. The result, m^4, is not positive if these are not the profiles of
+    an isotropic surface.
 
     Parameters
     ----------
     q : wave numbers, rad/m, increasing.
     one : C1D(q), m^3; its integral over positive and negative wave numbers is the mean square height.
-
-    Returns
-    -------
-    C(q), m^4; not positive if these are not the profiles of an isotropic surface.
     """
     log_q, log_one = np.log(q), np.log(one)
     exponent = -np.diff(log_one) / np.diff(log_q)

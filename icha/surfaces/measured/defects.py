@@ -57,15 +57,8 @@ def find_outliers(heights: np.ndarray) -> tuple[np.ndarray, float]:
     """Find the outliers of a scan: points, and patches with a steep edge, far from the heights around them.
 
     A point is compared with the median of 5 x 5 points, and with the medians of 5 x 5 blocks of 2, 4, 8, ... points a
-    side. The blocks find patches that are wider than four points, such as dust.
-
-    Parameters
-    ----------
-    heights : (ny, nx) array of heights, m; nan where missing.
-
-    Returns
-    -------
-    Mask of the outliers, and the largest deviation of an outlier divided by the robust rms height.
+    side. The blocks find patches that are wider than four points, such as dust. Return the mask of the outliers, and
+    the largest deviation of an outlier divided by the robust rms height.
     """
     known = np.isfinite(heights)
     # Medians, because one outlier may exceed all other heights by the rounding error of a float.
@@ -153,9 +146,7 @@ def line_offsets(level: np.ndarray) -> dict[str, float]:
 def level_lines(heights: np.ndarray) -> tuple[np.ndarray, bool]:
     """Subtract from each row its mean height and, if the tilts of the rows have steps, its tilt.
 
-    Returns
-    -------
-    Heights, and whether tilts were subtracted. The mean heights that rows have without offsets are lost too.
+    Return the heights, and whether tilts were subtracted. The mean heights that rows have without offsets are lost too.
     """
     means, tilts, x = fit_lines(heights)
     steps = np.diff(tilts[np.isfinite(tilts)])
