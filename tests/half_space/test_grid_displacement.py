@@ -61,13 +61,13 @@ def test_nodes_of_coarse_and_fine_grids_against_the_direct_image_sum(energy, n):
 def many_spots():
     """Spots of very different sizes, many of them: several groups, in a field of several blocks of rows."""
     rng = np.random.default_rng(6)
-    a = 10 ** rng.uniform(-3.5, -1.6, 400)
-    return rng.random((400, 2)), a, rng.uniform(0.5, 2, 400) * a / 0.2
+    a = 10 ** rng.uniform(-3.5, -1.6, 200)
+    return rng.random((200, 2)), a, rng.uniform(0.5, 2, 200) * a / 0.2
 
 
 @pytest.mark.parametrize("energy", ENERGIES)
 def test_large_and_small_spots_together_are_the_sum_of_each_alone(energy):
-    # Alone, a spot's Fourier series and window are others than among four hundred.
+    # Alone, a spot's Fourier series and window are others than among two hundred.
     centres, a, R = many_spots()
     n = 96
     together = displacement_field(law(energy), 1.0, n, centres, a, R)

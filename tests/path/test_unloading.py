@@ -194,20 +194,6 @@ def test_loading_again_goes_on_beyond_the_old_maximum():
     assert last.balance.work == pytest.approx(waypoints[-1].balance.work, rel=1e-4)
 
 
-def scattered(count, seed):
-    """Asperities anywhere in a cell, of random heights, that feel each other and their images."""
-    rng, side = np.random.default_rng(seed), np.sqrt(count)
-    heights = few.HEIGHT - 3 * np.abs(rng.normal(size=count))
-    return few.contact_of(heights, 10 * side * (rng.random((count, 2)) - 0.5), period=13 * side)
-
-
-def test_every_state_continues_the_history_of_the_state_before_it():
-    waypoints = few.travelled(scattered(2, 0), [0.02], unload=True, control="load")
-    for before, after in pairwise(waypoints):
-        assert after.state.history[: len(before.state.history)] == before.state.history
-    few.closed_again(waypoints)
-
-
 def test_a_contact_without_an_equilibrium_is_not_recorded():
     """The images of an asperity that jumps in pull it off again at once: no equilibrium exists at its jump-in."""
     contact = few.contact_of([few.HEIGHT], period=20.0, material=Material(1.0, 1.0, 1 / 1.1))
