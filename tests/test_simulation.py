@@ -171,7 +171,7 @@ def test_a_snapshot_that_is_not_finite_ends_a_cycle_with_what_was_reached(monkey
 
 
 def test_arguments_with_a_wrong_unit_give_a_warning():
-    fine = rough(slope=0.3)
+    fine = rough(32, ratio=8, slope=0.3)
     with pytest.warns(IchaWarning, match=r"rms_slope: 3e\+08 is unusual; expected 1e-4 to 5 .* SI units") as raised:
         Surface(fine.heights * 1e9, PERIOD)
     with pytest.warns(IchaWarning, match="period: 100 m is unusual"):

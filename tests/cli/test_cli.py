@@ -108,7 +108,7 @@ def test_user_errors_are_messages_and_status_2(project):
     ("arguments", "without"),
     [
         (["--help"], ["numpy", "pydantic", "yaml", "rich", *HEAVY]),
-        (["describe"], HEAVY),
+        (["describe"], [*HEAVY, "icha.figures"]),
         (["show", "run.nc"], ["matplotlib", "scipy.special"]),
     ],
 )

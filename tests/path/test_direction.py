@@ -94,7 +94,8 @@ def test_one_work_is_the_limit_of_two():
         assert float(runs[1][name]) == pytest.approx(float(runs[0][name]), rel=1e-4)
 
 
-@pytest.mark.parametrize("control", [pytest.param("separation", marks=pytest.mark.slow), "load"])
+@pytest.mark.slow
+@pytest.mark.parametrize("control", ["separation", "load"])
 def test_a_rough_surface_loses_what_its_fronts_dissipate_and_its_jumps(control):
     surface, material = few.small()
     work = material.surface_energy

@@ -65,10 +65,9 @@ def test_tensions_on_a_rough_surface_lie_where_the_load_of_the_first_loading_ris
     ("path", "reason"),
     [
         ({"forces": [2e-4], "turning_points": [("force", -3e-4)]}, "before the turning point force = -300 µN; the lar"),
-        ({"forces": [2e-4], "turning_points": [("indentation", -5e-6)]}, "before the turning point indentation = -5 µ"),
         ({"forces": [-3e-4, 2e-4]}, "does not reach the tension force = -300 µN; the largest tension is 2.* `unload"),
     ],
-    ids=["force", "indentation", "target"],
+    ids=["turning point", "target"],
 )
 def test_tension_beyond_pull_off_ends_a_path_by_physics_in_units_of_an_indenter(path, reason):
     with pytest.raises(icha.ConvergenceError, match=f"at an indentation of .*{reason}") as caught:

@@ -118,6 +118,7 @@ def computed(project):
     return {name for log in logs for name in re.findall(r"^\d+ of \d+: tiny/(\S+)$", log, re.MULTILINE)}
 
 
+@pytest.mark.slow
 def test_only_new_and_changed_files_are_computed(tmp_path):
     project = copy_project(REPOSITORY, tmp_path / "project")
     configuration = project / "config/campaigns/tiny.yaml"

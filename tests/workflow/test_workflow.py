@@ -117,6 +117,7 @@ def test_a_second_call_does_nothing(smoke):
     assert times() == before
 
 
+@pytest.mark.slow
 def test_a_large_campaign_can_be_planned(smoke, tmp_path):
     configuration = REPOSITORY / "config/campaigns/validation.yaml"
     elsewhere = ("-n", "-d", str(tmp_path), "--snakefile", "workflow/Snakefile")
