@@ -23,7 +23,7 @@ help:
 	@echo "make validation     run the campaign validation (two hours) and write the tables and figures of docs/validation.md"
 	@echo "make hysteresis     run the campaign hysteresis (forty minutes) and write the tables and figures of docs/hysteresis.md"
 	@echo "make tamaas         install Tamaas, an independent code, for comparisons in validation and tests"
-	@echo "make test           run the quick tests (five minutes): physics, every rule, wrong input"
+	@echo "make test           run the quick tests (three minutes): physics, every rule, wrong input"
 	@echo "make test-all       run all tests: more random cases, kills, resumption, Slurm, a browser, deposits"
 	@echo "make random-cases   run two thousand random cases; make test-all runs a hundred of them (SERIES=7: other ones)"
 	@echo "make audit          check the locked packages for known vulnerabilities (part of make test-all; needs network)"
