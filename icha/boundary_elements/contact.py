@@ -62,8 +62,6 @@ _BEYOND_REACH = 1 + 1e-6
 # Largest relative residual of the rates of a state. Where fronts stand, their bonds are stiff springs, and the error of
 # the stiffness is up to 20 000 times the residual.
 _RATE_ERROR, _RATE_ERROR_OF_SPRINGS = MODELS[REFERENCE_MODEL].stiffness_error, 1e-9
-# Least energy to which errors of the work in a loop are relative, in units of `surface_energy` times A0.
-_SMALLEST_WORK = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,11 +103,10 @@ class BoundaryElements(FullContactProblem):
         """Whether a part of a cell may be in contact: only at a short range of attraction."""
         return self.attraction.name == SHORT_RANGE
 
-    @cached_property
+    @property
     def path_accuracy(self) -> PathAccuracy:
-        """Accuracy of a path, with `least_work` of the material; without adhesion the work does not control steps."""
-        least_work = _SMALLEST_WORK * self.law.material.surface_energy
-        return replace(MODELS[REFERENCE_MODEL].accuracy, least_work=least_work, error_controlled_steps=self.adhesive)
+        """Accuracy with which a path resolves its events."""
+        return MODELS[REFERENCE_MODEL].accuracy
 
     def untouched(self) -> CellState:
         """Return the state without contact where a first summit jumps into contact, or a point touches or attracts."""

@@ -7,8 +7,7 @@ import numpy as np
 from icha.checks.findings import IDENTITY_LIMIT, LOSS, Definition
 from icha.contact.models import RESIDUAL_TOLERANCE, model_of
 from icha.datasets.quantities import LOSS_PARTS
-from icha.path.energy_balance import event_error, integration_error, pressure_jump
-from icha.path.targets import EVENT_ERROR_OVER_LOSS
+from icha.path.energy_balance import event_error, pressure_jump
 
 # Counts of events in a run, in the order of the flags of `event_kind`.
 EVENT_COUNTS = ("jump_in_count", "jump_off_count", "coalescence_count", "split_count")
@@ -72,7 +71,7 @@ def check_loop(run) -> Iterator[tuple]:
     # The rule for unions of asperities may lose energy. Patches of boundary elements merge and split reversibly.
     if float(run["surface_energy"]) == 0 and not _has_united(run):
         model = model_of(run.attrs)
-        unknown = work_error(run) / scale + 3 * model.accuracy.balance * count_unshared_separations(run)
+        unknown = work_error(run) / scale + 3 * model.accuracy.work * count_unshared_separations(run)
         yield "loop closes", abs(loss) / scale, CELL_CLOSURE_LIMIT if model.by_cells else IDENTITY_LIMIT + unknown
 
 
@@ -135,20 +134,9 @@ def work_error(run) -> float:
 
 
 def _event_error_bound(run):
-    """Return an upper bound (J/m^2) of the work error due to unknown positions of events within their steps.
-
-    The bound of a step with an event is the sum of two errors: the jump of the pressure causes `event_error`, and the
-    change of the stiffness causes `integration_error`. The path also limits the error of each step to the larger of two
-    energies. The first is EVENT_ERROR_OVER_LOSS times the energy of all jumps. The second is the sum of the magnitudes
-    of all changes of work and of loss, multiplied by the model's accuracy of a loss.
-    """
+    """Return an upper bound (J/m^2) of the work error due to unknown positions of events within their steps."""
     events = sum(np.diff(run[name]) for name in EVENT_COUNTS) > 0
     events &= np.diff(run["dissipated_by_load_jump"]) == 0  # in a jump at constant load the pressure is constant
     width, slope = np.diff(run["mean_separation"]), -finite_stiffness(run)
     jumped = pressure_jump(width, np.diff(run["nominal_pressure"]), slope[:-1], slope[1:])
-    work = float(np.sum(events * (event_error(width, jumped) + integration_error(width, slope[:-1], slope[1:]))))
-    released = sum(abs(float(run[f"dissipated_by_{name}"][-1])) for name in ("jump_in", "jump_off"))
-    lost = run["work"] - run["stored_energy"]
-    effort = float(np.sum(np.abs(np.diff(run["work"])) + np.abs(np.diff(lost))))
-    unknown = max(EVENT_ERROR_OVER_LOSS * released, model_of(run.attrs).accuracy.loss * effort)
-    return min(work, np.count_nonzero(events) * unknown)
+    return float(np.sum(events * event_error(width, jumped)))

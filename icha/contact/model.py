@@ -149,10 +149,10 @@ class ContactModel(Protocol):
         let_go : number of spots that break contact before the search; they are the spots closest to jump-off.
         """
 
-    def continue_from(self, state: State, before: State) -> State:
-        """Return `state` with a new history: the history of `before`, then the events between both states.
+    def continue_from(self, state: State, before: State) -> State | None:
+        """Return `state` as a continuation of the state `before`, or None if it must be computed again.
 
-        A path uses this method only if `path_accuracy.error_controlled_steps` is True.
+        Its history is the history of `before`, followed by the events between both states.
         """
 
     def pressure(self, state: State) -> float:

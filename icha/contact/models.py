@@ -56,21 +56,14 @@ class PathAccuracy:
     ----------
     target : largest relative error of a load or area that the solver meets.
     event : an event counts as located if the step that contains it is not longer than this value, in h_rms.
-    loss : largest error of the work of one step with events, relative to `StepAccuracy.energy_scale`.
-    balance : largest difference of work and energy change in a long step without events, relative to `energy_scale`.
+    work : largest error of the work of one step, relative to work and losses so far (see `icha.path.step_accuracy`).
     tension : largest relative error of the largest tension in a step without events.
-    least_work : lower limit of the energy to which `loss` is relative, J/m^2.
-    error_controlled_steps : if True, the error of the work of each step decides the length of the next step, because
-        the pressure may jump without an event. If False, each step may be twice as long as the previous step.
     """
 
     target: float = 1e-9
     event: float = 1e-12
-    loss: float = 1e-10
-    balance: float = 3e-6
+    work: float = 1e-6
     tension: float = 1e-8
-    least_work: float = 0.0
-    error_controlled_steps: bool = False
 
 
 @dataclass(frozen=True)
@@ -192,7 +185,7 @@ MODELS = {
         stiffness_error=1e-4,
         by_cells=True,
         # Fronts that hop from cell to cell lose energy that only a finer grid would resolve.
-        accuracy=PathAccuracy(target=1e-6, event=1e-5, loss=1e-4, tension=1e-5, error_controlled_steps=True),
+        accuracy=PathAccuracy(target=1e-6, event=1e-5, work=2e-4, tension=1e-5),
         resumable=True,
     ),
 }

@@ -60,9 +60,8 @@ class InteractingAsperities(AsperityContact):
         """Find the equilibrium at another mean separation (m), load or area; see `ContactModel.equilibrium`."""
         return find_equilibrium(self, state, separation, control, let_go=let_go)
 
-    def continue_from(self, state: ContactState, before: ContactState) -> ContactState:
-        """Raise `NotImplementedError`: a path calls this method only for models with `error_controlled_steps`."""
-        raise NotImplementedError
+    def continue_from(self, state: ContactState, before: ContactState) -> None:
+        """Return None: spots depend on the path, so the state must be computed again from the state `before`."""
 
     def pressure(self, state: ContactState) -> float:
         """Return the force divided by the nominal area, Pa."""

@@ -2,9 +2,8 @@
 
 On unloading every spot follows its stable branch until it jumps off. Unloading ends at complete separation or at a
 turning point. Stations are separations of a loading that all later legs visit again. The curves of the legs can then be
-compared, and in compression the errors of the integration cancel. Close to an event that changes the pressure (see
-`energy_balance`), steps become so short that the energy lost in the event is known accurately. With
-`path_accuracy.error_controlled_steps`, the error of the work of each step decides the length of the next one.
+compared, and without adhesion the errors of the integration cancel. A step is halved until its work is known: see
+`step_accuracy`.
 """
 
 from __future__ import annotations
@@ -22,7 +21,6 @@ from icha.path.loading import PathProgress
 from icha.path.step_accuracy import StepAccuracy
 from icha.path.stops import (
     CLOSE_TO_A_JUMP,
-    SAME_EXCESS,
     SAME_SEPARATION,
     InsideJump,
     TargetFunction,
@@ -60,10 +58,8 @@ def follow_cycle(
         progress.record_target(each.target, state)
         yield Waypoint(each.target, state, 0)
     yield waypoint_between_targets(start, 0)
-    cycle = _Cycle(contact, longest, progress, start, longest, StepAccuracy(contact, longest))
-    if contact.adhesive:
-        cycle.step_length = cycle.event_length
-    else:
+    cycle = _Cycle(contact, longest, progress, start, StepAccuracy(contact, longest))
+    if not contact.adhesive:
         cycle.stations = [start.separation + _ABOVE_CONTACT * contact.rms_height]
     yield from cycle.follow_leg(0, targets)
     if progress.skipped:
@@ -88,7 +84,7 @@ def follow_cycle(
 
 @dataclass(eq=False)
 class _Cycle:
-    """Position on a cyclic path, and the values that determine the length of the next step.
+    """Position on a cyclic path, and the ends of the next steps.
 
     Attributes
     ----------
@@ -96,12 +92,11 @@ class _Cycle:
     longest : longest step of the separation, m.
     progress : record of the path's progress.
     state : last equilibrium.
-    step_length : length of the next trial step, m, if `ahead` is empty and no station follows in this direction.
     accuracy : sums over all steps so far, and the accuracy that further steps need.
     leg : number of the leg, even on loading and odd on unloading.
+    ahead : ends of steps that were too long and were divided, the nearest last: the separation, m, and the equilibrium
+        found there, or None.
     event_at : `direction` times separation, m, where the shortest trial step with the next event ended; or inf.
-    ahead : with error-controlled steps, equilibria found at the ends of too long trial steps; the nearest is last.
-    longest_part : length (m) of the longest part accepted so far of a trial step that was too long and was divided.
     stations : separations of a loading that all later legs, in both directions, visit again, ascending, m.
     """
 
@@ -109,12 +104,10 @@ class _Cycle:
     longest: float
     progress: PathProgress
     state: State
-    step_length: float
     accuracy: StepAccuracy
     leg: int = 0
+    ahead: list[tuple[float, State | None]] = field(default_factory=list)
     event_at: float = np.inf
-    ahead: list[State] = field(default_factory=list)
-    longest_part: float = 0.0
     stations: list[float] = field(default_factory=list)
 
     @property
@@ -146,21 +139,23 @@ class _Cycle:
         `BeyondModel` if the surfaces separate before the last target. At the end of loading,
         separations that are far apart (`_is_new_station`) become stations; on reloading, only those below all others.
         """
-        self.leg, self.event_at, self.longest_part = leg, np.inf, 0.0
-        self.ahead.clear()
+        self.leg, self.event_at = leg, np.inf
+        # At first contact, adhesion pulls the first summit into contact at once.
+        first_jump = self.contact.adhesive and leg == 0
+        self.ahead = [(self.state.separation - self.event_length, None)] if first_jump else []
         pending, sent = sort_targets(targets, self.direction), None
-        visited, length_limit = [self.state.separation], np.inf
+        visited = [self.state.separation]
         while pending or until_apart:
             if not self.loading and self._is_apart():
                 if until_apart:
                     return
                 raise self.make_path_error(self._make_apart_error(pending[0]))
-            state, step = self.find_next_equilibrium(min(self._first_trial_length(), length_limit))
+            state, step = self.find_next_equilibrium()
             candidates = next_of_each_kind(pending) + ([sent] if sent else [])
             try:
                 target, met = find_first_target(candidates, self.state, state, self.direction)
             except InsideJump as jump:
-                self._keep(state)
+                self.ahead.append((state.separation, state))
                 if jump.target is sent:
                     sent = None
                     continue
@@ -171,22 +166,19 @@ class _Cycle:
                         raise self.make_path_error() from None
                 continue
             except NotConverged as failure:
-                length_limit = self._halve_step(abs(step.separation_change), failure)
-                self._keep(state)
+                self.ahead.append((state.separation, state))
+                self._halve_failed_step(abs(step.separation_change), failure)
                 continue
             if met is not state:
-                behind = self.direction * (met.separation - self.state.separation) < 0
-                if target and self.contact.path_accuracy.error_controlled_steps and behind:
+                if self.direction * (met.separation - self.state.separation) < 0:
                     # The branch after a jump leads back to the target. A target that is sent here is ignored.
                     yield self._advance(step, state)
                 else:
-                    self._keep(state)
+                    self.ahead.append((state.separation, state))
                 step = Step.between(self.contact, self.state, met)
             listed = None if target is sent else target
             self.progress.require_valid_state(self.state, met, listed, pending, self.loading)
-            # In leg 0, the first step is `event_length` with adhesion. Then try `longest` until a separation is kept.
-            self.step_length = self._choose_next_length(step) if leg or len(visited) > 1 else self.longest
-            between, length_limit = self._advance(step, met), np.inf
+            between = self._advance(step, met)
             if self._is_new_station(met.separation, visited[-1]):
                 visited.append(met.separation)
             if listed is not None:
@@ -209,72 +201,68 @@ class _Cycle:
         self.accuracy.add(step, state)
         self.progress.record_equilibrium(state, self.loading)
         self.state = state
-        self.ahead = [each for each in self.ahead if self.direction * (each.separation - state.separation) > 0]
+        if step.may_change_pressure:
+            self.event_at = np.inf
+        self.ahead = [end for end in self.ahead if self.direction * (end[0] - state.separation) > 0]
         return waypoint_between_targets(state, self.leg, step)
 
-    def _keep(self, state):
-        """With error-controlled steps, keep an equilibrium in `ahead`, because it may be the end of a later step."""
-        if self.contact.path_accuracy.error_controlled_steps:
-            self.ahead.append(state)
-
-    def find_next_equilibrium(self, length: float) -> tuple[State, Step]:
+    def find_next_equilibrium(self) -> tuple[State, Step]:
         """Find the next equilibrium by a step that is short enough; return the equilibrium and the step.
 
-        The step is halved until the solver finds an equilibrium, and then until one of three conditions is true. (a)
-        Work and largest tension of the step are known accurately enough. (b) The step is at most `event_length` long.
-        (c) The step has an event that may change the pressure, and starts at most `event_length` before `event_at`. In
-        (c) the event is located well enough: equilibria have errors, so the event may not happen in a shorter step. If
-        (a) is true and the tension has a new maximum within the step, the step ends at the maximum. With
-        error-controlled steps, the ends of too long steps are kept in `ahead`, and tried again as ends of later steps.
-
-        length : largest length of the first trial step, m. The next state of `ahead` limits it if that is closer.
+        The first step goes to the next station, or is as long as possible. It is halved until the solver finds an
+        equilibrium, and until work and largest tension of the step are known accurately enough, or the step is at most
+        `event_length` long. If the tension has a new maximum within an accurate step, the step ends at the maximum. The
+        ends of divided steps are kept in `ahead`, and are the ends of the following steps.
         """
-        start, accuracy, keeps = self.state, self.accuracy, self.contact.path_accuracy.error_controlled_steps
-        ahead = None
-        if self.ahead and abs(self.ahead[-1].separation - start.separation) < (1 + SAME_EXCESS) * length:
-            ahead = self.ahead.pop()
-            length = abs(ahead.separation - start.separation)
+        start, accuracy = self.state, self.accuracy
         while True:
+            end, known = self.ahead.pop() if self.ahead else (self._farthest_end(), None)
+            length = abs(end - start.separation)
             try:
-                state = self._find_equilibrium(start.separation + self.direction * length, length, ahead)
+                found = None if known is None else self.contact.continue_from(known, start)
+                state = found or self._find_equilibrium(end, length)
             except NotConverged as failure:
-                length = self._halve_step(length, failure)
+                self._halve_failed_step(length, failure)
                 continue
             step = Step.between(self.contact, start, state)
-            passed = step.may_change_pressure and self.direction * start.separation + self.event_length >= self.event_at
-            located = length <= self.event_length or passed
-            if located or (accuracy.is_work_known(state, step) and accuracy.is_tension_known(start, state, step)):
-                if ahead is not None and abs(step.loss) > accuracy.allowed_work_error(step):
-                    ahead = None  # After a loss, the present state may lead to another equilibrium, so solve again.
-                    continue
-                if step.may_change_pressure:
-                    self.event_at = np.inf
-                tension_peak = None if located else accuracy.locate_largest_tension(start, state, step)
+            if found is not None and accuracy.loses_energy(step):
+                self.ahead.append((end, None))  # The present state may lead to another equilibrium, so solve again.
+                continue
+            if length <= self.event_length or (step.may_change_pressure and self._has_passed_event()):
+                return state, step
+            middle = 0.5 * (start.separation + end)
+            if accuracy.is_work_known(step) and accuracy.is_tension_known(start, state, step):
+                tension_peak = accuracy.locate_largest_tension(start, state, step)
                 if tension_peak is None:
                     return state, step
-                shorter = tension_peak - start.separation
-            else:
-                if step.may_change_pressure and not keeps:
-                    self.event_at = min(self.event_at, self.direction * state.separation)
-                shorter = 0.5 * length
-            self._keep(state)
-            length, ahead = shorter, None
-            self.step_length = min(self.step_length, length)
+                middle = tension_peak
+            elif step.may_change_pressure:
+                self.event_at = min(self.event_at, self.direction * end)
+            self.ahead += [(end, state), (middle, None)]
 
-    def _find_equilibrium(self, separation, length, ahead=None):
+    def _has_passed_event(self):
+        """Return whether the next event was found in a longer step that ended at or before the present separation.
+
+        Equilibria have errors, so the event may not happen in a shorter step. It cannot be located more accurately.
+        """
+        return self.direction * self.state.separation + self.event_length >= self.event_at
+
+    def _halve_failed_step(self, length, failure):
+        """Let the next step be half as long as a failed step of a given length, m; raise if that is too short."""
+        half = self.progress.halve_step(length, failure, self.state, self.loading)
+        self.ahead.append((self.state.separation + self.direction * half, None))
+
+    def _find_equilibrium(self, separation, length):
         """Find the equilibrium at a separation, m, at the end of a step of a given length, m.
 
-        If the state `ahead` is given, this state is the equilibrium, and only its events are found. On unloading with
-        adhesion, the spots together may lose their equilibrium before any single spot has reached its own jump-off. If
-        this happens in a step shorter than `CLOSE_TO_A_JUMP` * h_rms, the spot closest to jump-off is made to break
-        contact. If there is still no equilibrium, more spots are made to break
-        contact: first two, then four, and so on, up to all spots.
+        On unloading with adhesion, the spots together may lose their equilibrium before any single spot has reached its
+        own jump-off. If this happens in a step shorter than `CLOSE_TO_A_JUMP` * h_rms, the spot closest to jump-off is
+        made to break contact. If there is still no equilibrium, more spots are made to break contact: first two, then
+        four, and so on, up to all spots.
         On unloading, an unstable equilibrium counts as no equilibrium, unless spots were made to break contact. Raise
         the first `NotConverged` if there is no equilibrium.
         """
         contact, start = self.contact, self.state
-        if ahead is not None:
-            return contact.continue_from(ahead, start)
         try:
             state = contact.equilibrium(start, separation)
             if separation > start.separation and contact.is_unstable(state):
@@ -288,31 +276,6 @@ class _Cycle:
                     return contact.equilibrium(start, separation, let_go=count)
                 count *= 2
         raise first
-
-    def _halve_step(self, length, failure):
-        """Return half the length of a failed step, m, and limit `step_length`; `NotConverged` if this is too short."""
-        length = self.progress.halve_step(length, failure, self.state, self.loading)
-        self.step_length = min(self.step_length, length)
-        return length
-
-    def _choose_next_length(self, step):
-        """Return the new `step_length` after an accepted step, m, at most `longest`; update `longest_part`.
-
-        Without error-controlled steps, `step_length` doubles. Error-controlled steps do not change it until `ahead` is
-        empty, when all parts of a trial step are accepted. The new value is then twice `longest_part`. But if the last
-        part is the longest, and a step of twice its length would be too inaccurate, the new value is `longest_part`.
-        """
-        if not self.contact.path_accuracy.error_controlled_steps:
-            return min(self.longest, 2 * self.step_length)
-        self.longest_part = max(self.longest_part, abs(step.separation_change))
-        if self.ahead or not step.separation_change:
-            return self.step_length
-        last_is_longest, part = self.longest_part == abs(step.separation_change), self.longest_part
-        self.longest_part = 0.0
-        # A step of twice the length has eight times the error.
-        if last_is_longest and 8 * step.work_error > self.accuracy.allowed_work_error(step):
-            return part
-        return min(self.longest, 2 * part)
 
     def _is_apart(self):
         """Return whether there are no spots and the separation is at least the separation of first contact."""
@@ -330,13 +293,11 @@ class _Cycle:
         between = self.longest / 64 if contact.adhesive else SAME_SEPARATION * contact.rms_height
         return abs(separation - last_kept) > between
 
-    def _first_trial_length(self):
-        """Return the distance to the next state of `ahead`, m, or to the next station of the leg, or `step_length`."""
-        if self.ahead:
-            return abs(self.ahead[-1].separation - self.state.separation)
+    def _farthest_end(self):
+        """Return the end of the longest possible step, m: the next station of the leg, if there is one."""
         at, same, stations = self.state.separation, SAME_SEPARATION * self.contact.rms_height, self.stations
         k = bisect_left(stations, at - same) - 1 if self.loading else bisect_right(stations, at + same)
-        return abs(stations[k] - at) if 0 <= k < len(stations) else self.step_length
+        return stations[k] if 0 <= k < len(stations) else at + self.direction * self.longest
 
     def _make_apart_error(self, target):
         """Return the exception for a path on which the surfaces separate before a turning point."""

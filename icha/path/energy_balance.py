@@ -32,16 +32,6 @@ def event_error(du, pressure_jump):
     return 0.5 * abs(du * pressure_jump)
 
 
-def integration_error(du, slope, end_slope):
-    """Return the estimated error of the work of a step without events, J/m^2: half the slope term in `Step.between`."""
-    return du**2 * abs(end_slope - slope) / 24
-
-
-# If the loss of a step exceeds this fraction of its work, jumps cause the loss. Below this fraction it may be an error:
-# in the asperity model, the interaction of spots of different size is not exactly reciprocal.
-_CERTAIN_LOSS = 0.1
-
-
 def _extrapolate_to_full_contact(du, p, q, slope, end_slope):
     """Return finite pressures and slopes at both ends of a step from or to full contact, and the error of the work.
 
@@ -66,8 +56,7 @@ class Step:
     work : work done on the contact, -(integral of p du), J/m^2.
     stored : change of the stored energy, J/m^2.
     front : energy that receding fronts dissipate, J/m^2.
-    pressure_jump : change of the pressure that the stiffnesses at both ends do not explain, Pa.
-    integration_error : estimated error of the work by the numerical integration, without events, J/m^2.
+    jump_error : largest error of the work because the pressure may jump anywhere in the step, J/m^2.
     may_change_pressure : whether there are events in which the pressure may jump; without adhesion these are only
         coalescences and splits.
     events : events of the step.
@@ -77,8 +66,7 @@ class Step:
     work: float
     stored: float
     front: float
-    pressure_jump: float
-    integration_error: float
+    jump_error: float
     may_change_pressure: bool
     events: Events
 
@@ -94,7 +82,7 @@ class Step:
         du = after.separation - before.separation
         p, q = contact.pressure(before), contact.pressure(after)
         slope, end_slope = -contact.stiffness(before), -contact.stiffness(after)
-        error = integration_error(du, slope, end_slope)
+        error = event_error(du, pressure_jump(du, q - p, slope, end_slope))
         if np.isinf(slope) or np.isinf(end_slope):
             p, q, slope, end_slope, error = _extrapolate_to_full_contact(du, p, q, slope, end_slope)
         # Without adhesion contact forms and breaks without a jump of the pressure.
@@ -104,8 +92,7 @@ class Step:
             work=-(0.5 * du * (p + q) + du**2 * (slope - end_slope) / 12),
             stored=contact.stored_energy(after) - contact.stored_energy(before),
             front=contact.front_dissipation(after) - contact.front_dissipation(before),
-            pressure_jump=pressure_jump(du, q - p, slope, end_slope),
-            integration_error=error,
+            jump_error=error,
             may_change_pressure=bool(count),
             events=events,
         )
@@ -116,28 +103,19 @@ class Step:
         return self.events.count(COALESCENCE) + self.events.count(SPLIT) > 0
 
     @property
+    def work_error(self) -> float:
+        """Largest error of the work, J/m^2: `jump_error`, but at most the loss if no event can have caused the loss."""
+        return self.jump_error if self.may_change_pressure else min(self.jump_error, abs(self.loss))
+
+    @property
+    def released(self) -> float:
+        """Absolute value of the energy released by jumps of spots, J/m^2."""
+        return abs(self.loss) if self.may_change_pressure and not self.unites_or_splits else 0.0
+
+    @property
     def loss(self) -> float:
         """Energy that is lost in events, J/m^2: work minus change of the stored energy minus dissipation of fronts."""
         return self.work - self.stored - self.front
-
-    @property
-    def event_error(self) -> float:
-        """Largest error of the work if events can be anywhere in the step, J/m^2; 0 if not `may_change_pressure`."""
-        return event_error(self.separation_change, self.pressure_jump) if self.may_change_pressure else 0.0
-
-    @property
-    def work_error(self) -> float:
-        """Upper bound of the error of the work, J/m^2, as if the pressure could jump anywhere, even without an event.
-
-        It is the larger of two errors, by such a jump and by the integration, but at most the computed loss. Because
-        the stored energy is exact, the computed loss of a step that loses no energy is the error of the work.
-        """
-        jump_error = event_error(self.separation_change, self.pressure_jump)
-        return min(max(jump_error, self.integration_error), abs(self.loss))
-
-    def reference_loss(self, contact: ContactModel) -> float:
-        """Return the sum of the absolute reference losses of all jumps (see the module), J/m^2."""
-        return float(np.abs(self.events.energy).sum()) / contact.area
 
 
 @dataclass(frozen=True)
@@ -165,22 +143,14 @@ class EnergyBalance:
     def add_step(self, contact: ContactModel, step: Step) -> EnergyBalance:
         """Return the balance after one more step.
 
-        1. Jumps cause the whole loss if the step has no coalescence and no split, if the sum of the reference losses is
-           not zero, and if the loss is within a factor of two of this sum or more than a tenth of the work. Jumps in
-           and jumps off share the loss in proportion to their reference losses, which must not have different signs.
+        1. Jumps cause the whole loss if the step has no coalescence and no split, and if the reference losses of the
+           jumps into and out of contact have the same sign. The jumps share the loss in proportion to these losses.
         2. In all other cases, each jump causes its reference loss. The rest of the loss is attributed to
            coalescence if the step has a coalescence or split; otherwise it is unattributed.
-
-        With error-controlled steps, jumps cause the whole loss whenever the sum of the reference losses is not zero.
-        The reference losses only divide it among the jumps, because they are computed at the ends of the step, and a
-        jump may be far from there.
         """
         energy, kinds, united = step.events.energy, step.events.kind, step.unites_or_splits
         jump_in, jump_off = (float(energy[kinds == kind].sum()) / contact.area for kind in (JUMP_IN, JUMP_OFF))
-        ratio = step.loss / ((jump_in + jump_off) or np.inf)
-        certain = 0.5 < ratio < 2 or abs(step.loss) > _CERTAIN_LOSS * abs(step.work)
-        by_jumps = contact.path_accuracy.error_controlled_steps or (certain and not united)
-        if by_jumps and ratio and jump_in * jump_off >= 0:
+        if not united and jump_in + jump_off and jump_in * jump_off >= 0:
             scale = step.loss / (jump_in + jump_off)
             jump_in, jump_off = scale * jump_in, scale * jump_off
         rest = step.loss - jump_in - jump_off

@@ -8,20 +8,12 @@ import numpy as np
 
 from icha.contact.model import ContactModel, State
 from icha.path.energy_balance import Step
-from icha.path.targets import EVENT_ERROR_OVER_LOSS
 
-# Largest error of the work by the events of a step, relative to `energy_scale`, while all reference losses are zero.
-EVENT_ERROR_OVER_WORK = 2e-4
-# Longest step in which spots may coalesce or split, relative to the longest step of the path.
+# Largest error of the work of a step, relative to the energy that jumps have released so far.
+ERROR_OVER_RELEASED = 2e-4
+# Longest step in which spots may coalesce or split, relative to the longest step of the path. A union depends on how
+# far its spots overlap when it is found.
 UNION_STEP = 1 / 16
-# Largest integration error of a step without events, relative to the energy scale. A larger error is allowed if the
-# work agrees with the change of the stored energy.
-_INTEGRATION_ERROR = 1e-4
-# On unloading in tension, integration errors are relative to _LOSS_SCALE times the reference losses so far, but at
-# least to _LEAST_LOSS times the energy scale.
-_LOSS_SCALE, _LEAST_LOSS = 10.0, 1e-2
-# Steps up to this fraction of the longest step of the path are accepted without a check of the integration error.
-_UNEXAMINED_STEP = 1 / 256
 # Largest relative error of the largest tension at an event.
 _MISSED_TENSION = 1e-3
 
@@ -34,66 +26,42 @@ class StepAccuracy:
     ----------
     contact : contact model.
     longest : longest step of the separation, m.
-    energy_scale : sum of the absolute values of work and loss of all steps so far, J/m^2; errors are relative to it.
-    reference_loss : sum of `Step.reference_loss` of all steps so far, J/m^2.
+    work : sum of the absolute values of work and loss of all steps so far, J/m^2.
+    released : sum of the absolute losses of all steps with events that may change the pressure, J/m^2.
     lowest_pressure : lowest nominal pressure so far, Pa; zero if the pressure was never negative.
     """
 
     contact: ContactModel
     longest: float
-    energy_scale: float = 0.0
-    reference_loss: float = 0.0
+    work: float = 0.0
+    released: float = 0.0
     lowest_pressure: float = 0.0
 
     def add(self, step: Step, state: State) -> None:
         """Add a step, and the state at its end, to the sums."""
-        self.energy_scale = self.energy_scale_after(step)
-        self.reference_loss += step.reference_loss(self.contact)
+        self.work += abs(step.work) + abs(step.loss)
+        self.released += step.released
         self.lowest_pressure = min(self.lowest_pressure, self.contact.pressure(state))
 
-    def energy_scale_after(self, step: Step) -> float:
-        """Return the value of `energy_scale` after one more step, J/m^2."""
-        return self.energy_scale + (abs(step.work) + abs(step.loss))
+    def allowed_error(self, step: Step) -> float:
+        """Return the largest allowed error of the work of a step, J/m^2.
 
-    def is_work_known(self, state, step):
-        """Return whether the work of a step that ends in a state is known accurately enough.
-
-        With error-controlled steps, `Step.work_error` must be small enough. Other steps are inaccurate in three cases.
-        First, `Step.event_error` is too large. Second, spots unite or split in a long step. Third, in a step without
-        events that may change the pressure, the integral of the pressure is inaccurate and differs from the change of
-        the stored energy. The limits of the third case are smaller on unloading in tension. The third case is not
-        checked for steps up to 1/256 of the longest step.
+        It is `path_accuracy.work` times the work and losses of the path including this step. With events that may
+        change the pressure, it is at least ERROR_OVER_RELEASED times the energy that events have released.
         """
-        if self.contact.path_accuracy.error_controlled_steps:
-            return step.work_error <= self.allowed_work_error(step)
-        length = abs(step.separation_change)
-        if step.event_error > self.allowed_work_error(step):
-            return False
-        # The union of two spots depends on how far they overlap when it is found.
-        if step.unites_or_splits and length > UNION_STEP * self.longest:
-            return False
-        accuracy = self.contact.path_accuracy
-        scale = energy_scale = self.energy_scale_after(step)
-        if step.separation_change > 0 and self.contact.pressure(state) < 0:
-            # In compression, loading and unloading visit the same separations, so their errors cancel. In tension
-            # these errors do not cancel, so that they must be small relative to the losses.
-            scale = min(energy_scale, max(_LOSS_SCALE * self.reference_loss, _LEAST_LOSS * energy_scale))
-        unbalanced = step.integration_error > _INTEGRATION_ERROR * scale and abs(step.loss) > accuracy.balance * scale
-        return step.may_change_pressure or not unbalanced or length <= _UNEXAMINED_STEP * self.longest
+        allowed = self.contact.path_accuracy.work * (self.work + abs(step.work) + abs(step.loss))
+        released = self.released + step.released
+        return max(allowed, ERROR_OVER_RELEASED * released)
 
-    def allowed_work_error(self, step):
-        """Return the largest allowed value of `work_error` or `event_error` of a step, J/m^2.
+    def is_work_known(self, step: Step) -> bool:
+        """Return whether the work of a step is known accurately enough."""
+        if step.unites_or_splits and abs(step.separation_change) > UNION_STEP * self.longest:
+            return False
+        return step.work_error <= self.allowed_error(step)
 
-        With error-controlled steps, it is `path_accuracy.loss` times the larger of the energy scale after the step and
-        `path_accuracy.least_work`. Otherwise, if the path including this step has reference losses, it is the larger of
-        EVENT_ERROR_OVER_LOSS times these losses and `path_accuracy.loss` times the energy scale after the step. Without
-        reference losses, it is EVENT_ERROR_OVER_WORK times this energy scale.
-        """
-        energy_scale, accuracy = self.energy_scale_after(step), self.contact.path_accuracy
-        if accuracy.error_controlled_steps:
-            return accuracy.loss * max(energy_scale, accuracy.least_work)
-        by_losses = EVENT_ERROR_OVER_LOSS * (self.reference_loss + step.reference_loss(self.contact))
-        return max(by_losses, accuracy.loss * energy_scale) if by_losses else EVENT_ERROR_OVER_WORK * energy_scale
+    def loses_energy(self, step: Step) -> bool:
+        """Return whether the loss of a step is larger than the allowed error of its work."""
+        return abs(step.loss) > self.allowed_error(step)
 
     def is_tension_known(self, start, state, step):
         """Return False if the tension inside a step may be larger than in any state of the path so far.

@@ -172,8 +172,7 @@ def find_target_state(target: TargetFunction, before: State, after: State) -> St
         width = sign * (before.separation - after.separation)
         if width <= max(SAME_SEPARATION, contact.path_accuracy.event) * contact.rms_height:
             return _solve_after_jump(target, before, after)
-        possible = not contact.path_accuracy.error_controlled_steps or _is_reachable(target, before, after)
-        if possible and (halvings < _TRIALS or halvings & (halvings - 1) == 0):
+        if _is_reachable(target, before, after) and (halvings < _TRIALS or halvings & (halvings - 1) == 0):
             with suppress(NotConverged):
                 found = target.solve(before, _guess_separation(target, before, after))
                 if 0 < sign * (before.separation - found.separation) <= width:

@@ -28,9 +28,6 @@ LEAST_PRESSURE, LEAST_AREA = 1e-12, 1e-9
 # Limits and default of the longest step of the separation, in h_rms. With 1e-4 a path has some 10 000 equilibria.
 MIN_STEP, MAX_STEP = 1e-4, 0.5
 DEFAULT_STEP = 0.15
-# Largest error of the work of one step because its events may happen anywhere in the step, relative to the sum of the
-# absolute reference losses of all jumps so far. Used for paths in `step_accuracy`, and for checks of finished runs.
-EVENT_ERROR_OVER_LOSS = 5e-4
 
 STEP = FloatRange("h_rms", least=MIN_STEP, most=MAX_STEP)
 

@@ -76,7 +76,7 @@ def test_a_smaller_contact_than_at_jump_off_breaks_as_a_punch():
 def test_an_edge_stands_between_turning_points():
     """A reload goes back along the same straight line, and advances again from the state where it stood."""
     turns = [("reduced_pressure", 0.0), ("reduced_pressure", 0.04)]
-    contact, leg, _d, a, force, _stiffness, last = loop(3.0, [0.02], turning_points=turns)
+    contact, leg, _d, a, force, _stiffness, last = loop(3.0, [0.02], turning_points=turns, max_step=0.05)
     first = a[leg == 0].max()
     for each in (1, 2):
         stood = (leg == each) & (force < 19.9)

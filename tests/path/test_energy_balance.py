@@ -204,7 +204,7 @@ def test_the_step_does_not_matter(monkeypatch):
     """Half the longest step, and half of the allowed errors of the work, change pull-off and loss by less than 1 %."""
     coarse = few.united_run()
     assert int(coarse.coalescence_count[-1]) > 0
-    for name in ("EVENT_ERROR_OVER_LOSS", "EVENT_ERROR_OVER_WORK", "UNION_STEP"):
+    for name in ("ERROR_OVER_RELEASED", "UNION_STEP"):
         monkeypatch.setattr(step_accuracy, name, 0.5 * getattr(step_accuracy, name))
     fine = icha.simulate(*few.small(), Path([3.5e-2], unload=True, max_step=0.5 * DEFAULT_STEP))
     assert fine.sizes["step"] > coarse.sizes["step"]
@@ -221,8 +221,7 @@ def test_jumps_that_nearly_cancel_lose_no_more_than_each_alone(gained_and_lost):
         work=0.6,
         stored=0.1,
         front=0.0,
-        pressure_jump=0.0,
-        integration_error=0.0,
+        jump_error=0.0,
         may_change_pressure=True,
         events=events,
     )

@@ -164,9 +164,8 @@ def test_turning_points_are_hit_exactly(kind, back, forth, control):
 
 def test_a_loop_without_events_is_reversible():
     contact = some()
-    waypoints = few.travelled(
-        contact, [0.01], turning_points=[("reduced_pressure", -0.002), ("reduced_pressure", 0.01)]
-    )
+    turns = [("reduced_pressure", -0.002), ("reduced_pressure", 0.01)]
+    waypoints = few.travelled(contact, [0.01], turning_points=turns, max_step=0.1)
     there, back, again = ([w for w in waypoints if w.leg == leg] for leg in range(3))
     for waypoints in (there, again):
         assert few.counts(waypoints[-1].state)[: JUMP_OFF + 1] == [2, 0]
