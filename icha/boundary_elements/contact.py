@@ -7,6 +7,7 @@ import pathlib
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.metadata import version
+from typing import ClassVar
 
 import numpy as np
 
@@ -68,6 +69,8 @@ _RATE_ERROR, _RATE_ERROR_OF_SPRINGS = MODELS[REFERENCE_MODEL].stiffness_error, 1
 class BoundaryElements(FullContactProblem):
     """Contact model of a rough surface against a half-space or layer, by boundary elements on grid cells."""
 
+    path_accuracy: ClassVar[PathAccuracy] = MODELS[REFERENCE_MODEL].accuracy
+
     @cached_property
     def cell_heights(self) -> np.ndarray:
         """Heights in cell sizes, (n, n)."""
@@ -102,11 +105,6 @@ class BoundaryElements(FullContactProblem):
     def divides_cells(self) -> bool:
         """Whether a part of a cell may be in contact: only at a short range of attraction."""
         return self.attraction.name == SHORT_RANGE
-
-    @property
-    def path_accuracy(self) -> PathAccuracy:
-        """Accuracy with which a path resolves its events."""
-        return MODELS[REFERENCE_MODEL].accuracy
 
     def untouched(self) -> CellState:
         """Return the state without contact where a first summit jumps into contact, or a point touches or attracts."""

@@ -71,7 +71,7 @@ def check_loop(run) -> Iterator[tuple]:
     # The rule for unions of asperities may lose energy. Patches of boundary elements merge and split reversibly.
     if float(run["surface_energy"]) == 0 and not _has_united(run):
         model = model_of(run.attrs)
-        unknown = work_error(run) / scale + 3 * model.accuracy.work * count_unshared_separations(run)
+        unknown = work_error(run) / scale + 3 * model.accuracy.reversible_work * count_unshared_separations(run)
         yield "loop closes", abs(loss) / scale, CELL_CLOSURE_LIMIT if model.by_cells else IDENTITY_LIMIT + unknown
 
 

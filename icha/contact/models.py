@@ -57,12 +57,14 @@ class PathAccuracy:
     target : largest relative error of a load or area that the solver meets.
     event : an event counts as located if the step that contains it is not longer than this value, in h_rms.
     work : largest error of the work of one step, relative to work and losses so far (see `icha.path.step_accuracy`).
+    reversible_work : the same without adhesion, where most errors of loading and unloading cancel.
     tension : largest relative error of the largest tension in a step without events.
     """
 
     target: float = 1e-9
     event: float = 1e-12
     work: float = 1e-6
+    reversible_work: float = 3e-6
     tension: float = 1e-8
 
 
@@ -185,7 +187,7 @@ MODELS = {
         stiffness_error=1e-4,
         by_cells=True,
         # Fronts that hop from cell to cell lose energy that only a finer grid would resolve.
-        accuracy=PathAccuracy(target=1e-6, event=1e-5, work=2e-4, tension=1e-5),
+        accuracy=PathAccuracy(target=1e-6, event=1e-5, work=1e-4, tension=1e-5),
         resumable=True,
     ),
 }

@@ -224,15 +224,14 @@ class _Cycle:
             except NotConverged as failure:
                 self._halve_failed_step(length, failure)
                 continue
-            step = Step.between(self.contact, start, state)
-            if found is not None and accuracy.loses_energy(step):
-                self.ahead.append((end, None))  # The present state may lead to another equilibrium, so solve again.
-                continue
-            if length <= self.event_length or (step.may_change_pressure and self._has_passed_event()):
-                return state, step
-            middle = 0.5 * (start.separation + end)
-            if accuracy.is_work_known(step) and accuracy.is_tension_known(start, state, step):
-                tension_peak = accuracy.locate_largest_tension(start, state, step)
+            step, middle = Step.between(self.contact, start, state), 0.5 * (start.separation + end)
+            located = length <= self.event_length or (step.may_change_pressure and self._has_passed_event())
+            if located or (accuracy.is_work_known(step) and accuracy.is_tension_known(start, state, step)):
+                if found is not None and accuracy.loses_energy(step):
+                    # The present state may lead to another equilibrium, so solve again.
+                    self.ahead.append((end, None))
+                    continue
+                tension_peak = None if located else accuracy.locate_largest_tension(start, state, step)
                 if tension_peak is None:
                     return state, step
                 middle = tension_peak

@@ -49,7 +49,9 @@ class StepAccuracy:
         It is `path_accuracy.work` times the work and losses of the path including this step. With events that may
         change the pressure, it is at least ERROR_OVER_RELEASED times the energy that events have released.
         """
-        allowed = self.contact.path_accuracy.work * (self.work + abs(step.work) + abs(step.loss))
+        accuracy = self.contact.path_accuracy
+        relative = accuracy.work if self.contact.adhesive else accuracy.reversible_work
+        allowed = relative * (self.work + abs(step.work) + abs(step.loss))
         released = self.released + step.released
         return max(allowed, ERROR_OVER_RELEASED * released)
 
@@ -66,17 +68,19 @@ class StepAccuracy:
     def is_tension_known(self, start, state, step):
         """Return False if the tension inside a step may be larger than in any state of the path so far.
 
-        A larger tension is only possible on unloading with events that may change the pressure: the tension just before
-        the event may be as large as the tangent at the start. It may exceed the larger tension of both states by a
-        fraction of _MISSED_TENSION. With adhesion also return False if the last contact breaks in the step.
+        On unloading, the pressure may rise in a jump at the end of the step. With events that may change the pressure,
+        its slope up to the jump is that at the start, otherwise the mean slope of both ends. The tension may then
+        exceed the larger tension of both states by a fraction of _MISSED_TENSION. With adhesion also return False if
+        the last contact breaks in the step.
         """
-        contact = self.contact
-        if step.separation_change < 0 or not step.may_change_pressure:
+        contact, du = self.contact, step.separation_change
+        slope, end_slope = (-contact.stiffness(each) for each in (start, state))
+        if du < 0 or not np.isfinite(slope + end_slope):
             return True
         if contact.adhesive and contact.spot_count(start) and not contact.spot_count(state):
             return False  # This event must be located as exactly as possible.
-        p, slope = contact.pressure(start), -contact.stiffness(start)
-        lowest, known = min(p, p + step.separation_change * slope), min(p, contact.pressure(state))
+        p, slope = contact.pressure(start), slope if step.may_change_pressure else 0.5 * (slope + end_slope)
+        lowest, known = min(p, p + du * slope), min(p, contact.pressure(state))
         return lowest >= self.lowest_pressure or known - lowest <= _MISSED_TENSION * abs(lowest)
 
     def locate_largest_tension(self, start, state, step):
