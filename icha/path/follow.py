@@ -4,9 +4,9 @@ from collections.abc import Callable, Generator, Iterator
 from dataclasses import replace
 
 from icha.contact.model import ContactModel, State
-from icha.path.cycle import follow_cycle
 from icha.path.energy_balance import EnergyBalance, Waypoint, waypoint_between_targets
-from icha.path.loading import PathProgress, first_loading
+from icha.path.legs import follow_legs
+from icha.path.progress import PathProgress
 from icha.path.stops import TargetFunction
 from icha.path.targets import BETWEEN, LOAD_CONTROL, REDUCED_PRESSURE, Path, Target
 
@@ -35,9 +35,9 @@ def follow(contact: ContactModel, path: Path, report: Callable[[str], None] | No
     """
     longest = path.max_step * contact.rms_height
     record = PathProgress(contact, len(path.targets), longest, report)
-    if not (path.cyclic or any(target.needs_adhesion for target in path.targets)):
-        return first_loading(contact, [TargetFunction(target, contact) for target in path.targets], longest, record)
-    waypoints = follow_cycle(contact, path, longest, record)
+    # Where loads rise to tensions, equilibria depend on how accurately jumps are located.
+    energies = path.cyclic or any(target.needs_adhesion for target in path.targets)
+    waypoints = follow_legs(contact, path, longest, record, energies)
     if not path.cyclic:
         return (replace(each, step=None) for each in waypoints if each.target.kind != BETWEEN)
     if path.control == LOAD_CONTROL:

@@ -7,8 +7,8 @@ from few_asperities import HEIGHT, contact_of
 from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
 from icha.checks.run import check_run
 from icha.contact.model import NotConverged
-from icha.path import loading
-from icha.path.loading import PathProgress
+from icha.path import progress as records
+from icha.path.progress import PathProgress
 
 WAVES = np.add.outer(*[np.cos(np.linspace(0, 2 * np.pi, 16, endpoint=False))] * 2)
 
@@ -65,7 +65,7 @@ def test_at_the_ends_of_the_ranges_runs_are_finite_and_pass_their_checks(height,
 
 
 def test_a_path_that_does_not_get_on_ends_and_says_so(monkeypatch):
-    monkeypatch.setattr(loading, "_MOST_EQUILIBRIA", 10)
+    monkeypatch.setattr(records, "_MOST_EQUILIBRIA", 10)
     contact = contact_of([HEIGHT])
     state, progress = contact.untouched(), PathProgress(contact, 1, longest=1.0)
     for _ in range(11):

@@ -1,9 +1,10 @@
-"""Cycles of loading and unloading: all equilibria of a path that continues after the first loading.
+"""Legs of a path: the equilibria of loading and unloading, from target to target or to complete separation.
 
 On unloading every spot follows its stable branch until it jumps off. Unloading ends at complete separation or at a
-turning point. Stations are separations of a loading that all later legs visit again. The curves of the legs can then be
-compared, and without adhesion the errors of the integration cancel. A step is halved until its work is known: see
-`step_accuracy`.
+turning point. If a target is expected within the next step, the solver first looks directly for the state at this
+target. On a path with unloading, or with tensions as targets, all equilibria are recorded instead: a step is halved
+until its work is known (see `step_accuracy`). Stations are separations of a loading that all later legs visit again.
+The curves of the legs can then be compared, and without adhesion the errors of the integration cancel.
 """
 
 from __future__ import annotations
@@ -12,12 +13,13 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Generator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from operator import itemgetter
 
 import numpy as np
 
 from icha.contact.model import BeyondModel, ContactModel, NotConverged, State
 from icha.path.energy_balance import Step, Waypoint, waypoint_between_targets
-from icha.path.loading import PathProgress
+from icha.path.progress import PathProgress
 from icha.path.step_accuracy import StepAccuracy
 from icha.path.stops import (
     CLOSE_TO_A_JUMP,
@@ -36,10 +38,10 @@ from icha.support.formatting import format_quantity
 _ABOVE_CONTACT = 1e-8
 
 
-def follow_cycle(
-    contact: ContactModel, path: Path, longest: float, progress: PathProgress
+def follow_legs(
+    contact: ContactModel, path: Path, longest: float, progress: PathProgress, energies: bool
 ) -> Generator[Waypoint, TargetFunction | None, None]:
-    """Follow a path that continues after the first loading, and yield a waypoint for each equilibrium.
+    """Follow all legs of a path, and yield a waypoint for each equilibrium.
 
     After each waypoint the caller may send one additional target for the next step (`generator.send`). If the step
     meets this target first, the generator yields the waypoint at this target. Sent targets inside jumps are
@@ -48,6 +50,7 @@ def follow_cycle(
 
     longest : longest step of the separation, m.
     progress : record of the path's progress; it counts and reports the targets.
+    energies : whether work and largest tension of every step must be known accurately.
     """
     start, targets = contact.untouched(), [TargetFunction.on_loading(target, contact) for target in path.targets]
     # Targets at separations above first contact, where nothing touches.
@@ -58,33 +61,33 @@ def follow_cycle(
         progress.record_target(each.target, state)
         yield Waypoint(each.target, state, 0)
     yield waypoint_between_targets(start, 0)
-    cycle = _Cycle(contact, longest, progress, start, StepAccuracy(contact, longest))
+    legs = _Legs(contact, longest, progress, start, StepAccuracy(contact, longest), energies)
     if not contact.adhesive:
-        cycle.stations = [start.separation + _ABOVE_CONTACT * contact.rms_height]
-    yield from cycle.follow_leg(0, targets)
+        legs.stations = [start.separation + _ABOVE_CONTACT * contact.rms_height]
+    yield from legs.follow_leg(0, targets)
     if progress.skipped:
-        raise cycle.make_path_error()
+        raise legs.make_path_error()
     for leg, turn in enumerate(path.turning_points, start=1):
         target = TargetFunction(turn, contact) if leg % 2 else TargetFunction.on_loading(turn, contact)
-        if (target.excess(cycle.state) > 0) != (leg % 2 == 1):
-            cycle.leg, name = leg, "unloading" if leg % 2 else "loading"
+        if (target.excess(legs.state) > 0) != (leg % 2 == 1):
+            legs.leg, name = leg, "unloading" if leg % 2 else "loading"
             reason = f"leg {leg} ({name}) already starts beyond its turning point {turn.describe()}"
-            raise cycle.make_path_error(NotConverged(reason))
-        yield from cycle.follow_leg(leg, [target])
-        progress.report_position(f"turning point {turn.describe()}", cycle.state)
+            raise legs.make_path_error(NotConverged(reason))
+        yield from legs.follow_leg(leg, [target])
+        progress.report_position(f"turning point {turn.describe()}", legs.state)
     if path.unload:
         leg = len(path.turning_points) + (len(path.turning_points) % 2 == 0)
         saved = {(target.kind, target.value): target for target in path.unloading_snapshots}
         again = {(target.kind, target.value): replace(target, snapshot=False) for target in path.targets}
         targets = [TargetFunction(target, contact) for target in (again | saved).values()]
-        pending = [target for target in targets if target.excess(cycle.state) > target.tolerance]
-        yield from cycle.follow_leg(leg, pending, until_apart=True)
-        progress.report_position("apart", cycle.state)
+        pending = [target for target in targets if target.excess(legs.state) > target.tolerance]
+        yield from legs.follow_leg(leg, pending, until_apart=True)
+        progress.report_position("apart", legs.state)
 
 
 @dataclass(eq=False)
-class _Cycle:
-    """Position on a cyclic path, and the ends of the next steps.
+class _Legs:
+    """Position on a path, and the ends of the next steps.
 
     Attributes
     ----------
@@ -93,6 +96,7 @@ class _Cycle:
     progress : record of the path's progress.
     state : last equilibrium.
     accuracy : sums over all steps so far, and the accuracy that further steps need.
+    energies : whether work and largest tension of every step must be known accurately.
     leg : number of the leg, even on loading and odd on unloading.
     ahead : ends of steps that were too long and were divided, the nearest last: the separation, m, and the equilibrium
         found there, or None.
@@ -105,6 +109,7 @@ class _Cycle:
     progress: PathProgress
     state: State
     accuracy: StepAccuracy
+    energies: bool
     leg: int = 0
     ahead: list[tuple[float, State | None]] = field(default_factory=list)
     event_at: float = np.inf
@@ -141,7 +146,7 @@ class _Cycle:
         """
         self.leg, self.event_at = leg, np.inf
         # At first contact, adhesion pulls the first summit into contact at once.
-        first_jump = self.contact.adhesive and leg == 0
+        first_jump = self.energies and self.contact.adhesive and leg == 0
         self.ahead = [(self.state.separation - self.event_length, None)] if first_jump else []
         pending, sent = sort_targets(targets, self.direction), None
         visited = [self.state.separation]
@@ -150,8 +155,8 @@ class _Cycle:
                 if until_apart:
                     return
                 raise self.make_path_error(self._make_apart_error(pending[0]))
-            state, step = self.find_next_equilibrium()
             candidates = next_of_each_kind(pending) + ([sent] if sent else [])
+            state, step = self.find_next_equilibrium(candidates)
             try:
                 target, met = find_first_target(candidates, self.state, state, self.direction)
             except InsideJump as jump:
@@ -206,18 +211,21 @@ class _Cycle:
         self.ahead = [end for end in self.ahead if self.direction * (end[0] - state.separation) > 0]
         return waypoint_between_targets(state, self.leg, step)
 
-    def find_next_equilibrium(self) -> tuple[State, Step]:
+    def find_next_equilibrium(self, targets: list[TargetFunction]) -> tuple[State, Step]:
         """Find the next equilibrium by a step that is short enough; return the equilibrium and the step.
 
         The first step goes to the next station, or is as long as possible. It is halved until the solver finds an
-        equilibrium, and until work and largest tension of the step are known accurately enough, or the step is at most
-        `event_length` long. If the tension has a new maximum within an accurate step, the step ends at the maximum. The
-        ends of divided steps are kept in `ahead`, and are the ends of the following steps.
+        equilibrium. With `energies`, it is also halved until work and largest tension of the step are known accurately
+        enough, or the step is at most `event_length` long. If the tension has a new maximum within an accurate step,
+        the step ends at the maximum. The ends of divided steps are kept in `ahead`, and are the ends of the following
+        steps. Without `energies`, the step ends at one of the next `targets` if the solver finds this state directly.
         """
         start, accuracy = self.state, self.accuracy
         while True:
             end, known = self.ahead.pop() if self.ahead else (self._farthest_end(), None)
             length = abs(end - start.separation)
+            if not self.energies and (state := self._find_target_directly(targets, length)):
+                return state, Step.between(self.contact, start, state)
             try:
                 found = None if known is None else self.contact.continue_from(known, start)
                 state = found or self._find_equilibrium(end, length)
@@ -225,6 +233,8 @@ class _Cycle:
                 self._halve_failed_step(length, failure)
                 continue
             step, middle = Step.between(self.contact, start, state), 0.5 * (start.separation + end)
+            if not self.energies:
+                return state, step
             located = length <= self.event_length or (step.may_change_pressure and self._has_passed_event())
             if located or (accuracy.is_work_known(step) and accuracy.is_tension_known(start, state, step)):
                 if found is not None and accuracy.loses_energy(step):
@@ -238,6 +248,25 @@ class _Cycle:
             elif step.may_change_pressure:
                 self.event_at = min(self.event_at, self.direction * end)
             self.ahead += [(end, state), (middle, None)]
+
+    def _find_target_directly(self, targets, length):
+        """Find the state at the target that is expected first within a step of a given length, m; None if it fails.
+
+        If each load has only one equilibrium, the target may be at any distance.
+        """
+        contact, start = self.contact, self.state
+        expected, target = max(((each.predict_separation(start), each) for each in targets), key=itemgetter(0))
+        reach = np.inf if contact.is_unique else length
+        if start.separation - expected > reach:
+            return None
+        try:
+            found = target.solve(start, expected)
+        except NotConverged:
+            return None
+        same = SAME_SEPARATION * contact.rms_height
+        outside = target.control and not start.separation - reach <= found.separation <= start.separation + same
+        passed = any(other.excess(found) > other.tolerance for other in targets if other is not target)
+        return None if outside or passed else found
 
     def _has_passed_event(self):
         """Return whether the next event was found in a longer step that ended at or before the present separation.

@@ -1,24 +1,18 @@
-"""First loading from target to target, and the record of a path's progress."""
+"""Record of a path's progress: counts, reports, and the exceptions that end a path."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from operator import itemgetter
 
 import numpy as np
 
 from icha.contact.model import BeyondModel, ContactModel, NotConverged, State
-from icha.path.energy_balance import Waypoint
 from icha.path.stops import (
-    SAME_SEPARATION,
     InsideJump,
     TargetFunction,
     describe_separation,
-    find_first_target,
-    next_of_each_kind,
-    sort_targets,
 )
 from icha.path.targets import Target
 
@@ -141,84 +135,3 @@ class PathProgress:
             f"at {describe_separation(contact, state)}, A/A0 = {contact.area_fraction(state):.3g}, "
             f"after {self.reached} of {self.total} stops: {'; '.join(map(str, failures))}{sticky}"
         )
-
-
-# After this number of failed attempts to solve directly for a target, an ordinary step brackets the target.
-_DIRECT_ATTEMPTS = 2
-# After the first failed attempt, the path goes this fraction of the distance to the target, and then tries again. If
-# the distance is at most `_LONG` times the longest step, there is no second attempt.
-_FIRST_FRACTION, _LONG = 0.6, 0.1
-# Number of equilibria after a failed step before steps become longer again, because a longer step usually fails again.
-_PATIENCE = 8
-
-
-def first_loading(
-    contact: ContactModel, targets: list[TargetFunction], longest: float, progress: PathProgress
-) -> Iterator[Waypoint]:
-    """Follow a path that ends with the first loading, and yield a waypoint for every target.
-
-    If a target is expected within the next step, the solver looks directly for the state at this target. If every load
-    has only one equilibrium, it does so at any distance. If this fails and the target is far, the path goes a part of
-    the distance and tries once more. In all other cases the separation
-    decreases by one step, at most `longest`, m; a target within this step is found by `find_first_target`. The step is
-    halved if there is no equilibrium at its end. If a target lies inside a jump, the path goes on from the state before
-    the jump, and the error is raised after the last target. Raise the errors of `icha.path.follow.follow`.
-    """
-    state = first_contact = contact.untouched()
-    pending, step, failed_trials, successes = sort_targets(targets, -1), longest, 0, 0
-    target: TargetFunction | None
-    while pending:
-        if contact.spot_count(state) == 0 and state.separation > first_contact.separation:
-            state = first_contact  # There are no events above first contact, so start from there.
-        following = next_of_each_kind(pending)
-        expected, nearest = max(((each.predict_separation(state), each) for each in following), key=itemgetter(0))
-        distance = state.separation - expected
-        try:
-            reach = np.inf if contact.is_unique else step
-            if distance <= reach and failed_trials < _DIRECT_ATTEMPTS:
-                target = nearest
-                after = _solve_within_step(nearest, expected, following, state, reach)
-                if after is None:
-                    # Next try a shorter step. After a second failed attempt, two states bracket the target.
-                    failed_trials = failed_trials + 1 if distance > _LONG * longest else _DIRECT_ATTEMPTS
-                    if failed_trials < _DIRECT_ATTEMPTS:
-                        step, successes = _FIRST_FRACTION * distance, 0
-                    continue
-            else:
-                after = contact.equilibrium(state, state.separation - step)
-                target, after = find_first_target(following, state, after, -1)
-        except InsideJump as jump:
-            pending.remove(jump.target)
-            progress.skipped.append(jump)
-            state, failed_trials = jump.before, 0
-            continue
-        except NotConverged as failure:
-            step, successes = progress.halve_step(step, failure, state, loading=True), 0
-            continue
-        successes += 1
-        step = min(longest, 2 * step) if successes >= _PATIENCE else step
-        progress.require_valid_state(state, after, target, pending, loading=True)
-        state = after
-        progress.record_equilibrium(state, loading=True)
-        if target is not None:
-            pending.remove(target)
-            failed_trials = 0
-            progress.record_target(target.target, state)
-            yield Waypoint(target.target, state)
-    if progress.skipped:
-        raise progress.make_path_error(state, True)
-
-
-def _solve_within_step(target, expected, following, state, step) -> State | None:
-    """Return the state at a target, near the `expected` separation, m; None if the solver finds none.
-
-    Also return None if the state lies beyond another target of `following` or, for a load or area, outside a `step`, m.
-    """
-    try:
-        found = target.solve(state, expected)
-    except NotConverged:
-        return None
-    same = SAME_SEPARATION * target.contact.rms_height
-    outside = target.control and not state.separation - step <= found.separation <= state.separation + same
-    passed = any(other.excess(found) > other.tolerance for other in following if other is not target)
-    return None if outside or passed else found
