@@ -45,7 +45,8 @@ def loop(cells, ratio, deep, grid=48):
     surface = Surface(np.zeros((grid, grid)), side, "free", Sphere(RADIUS))
     material = Material(MODULUS, (ADVANCING, ratio * ADVANCING), interaction_range=1e-9)
     depth = float(sphere_contact(a, RADIUS, MODULUS, ADVANCING).indentation)
-    return simulate(surface, material, Path(indentations=[depth], unload=True, snapshots=[]), model=MODEL)
+    path = Path(indentations=[depth], unload=True, snapshots=[], max_step=0.1)
+    return simulate(surface, material, path, model=MODEL)
 
 
 def release_rate(run):
