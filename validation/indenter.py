@@ -29,13 +29,8 @@ PARTS: Parts = {
     "pull_off": (single.sphere_pull_off, [(*grid, place) for grid, place in product(_GRIDS, single.PLACES)]),
     "punch": (single.punch, [(cells, square) for square, cells in product((False, True), (8, 12, 16))]),
     "cone": (single.cone, [(1 / 2,), (1 / 4, 144)]),
-    "ellipse": (single.ellipse, [(1 / 8, 2.0), (1 / 8, 4.0)]),
-    "wave": (single.guduru, [(1 / 16, 0.25, 1.5), (1 / 16, 0.1, 1.0)]),
-    "along": (single.ripples_along, [(20, 6), (20, 10), (30, 10), (40, 10), (40, 14)]),
-    "across": (single.ripples_across, [(1 / 16, 0.1, 1.0), (1 / 24, 0.1, 1.0)]),
     "without_adhesion": (rough.without_adhesion, [("sphere",), ("rough square",), ("layer",)]),
     "layer_limits": (rough.layer_limits, [()]),
-    "balance": (rough.conformal_sphere, [(0.05, 1), (0.1, 2), (0.15, 3), (0.2, 4), (0.3, 5)]),
     "convergence": (rough.rough_loop, [(64,), (128,), (256,)]),
     "smooth_loop": (rough.smooth_loop, [()]),
     "direction": (
@@ -46,7 +41,6 @@ PARTS: Parts = {
         single.pinned_front,
         [(cells, *others) for others, cells in product(((2, 0), (4, 0), (8, 0), (2, 3.0)), (16, 32, 48))],
     ),
-    "pinning": (single.pinning, [(0.1,), (0.2,), (0.4,), (0.6,), (0.8,), (1.2,)]),
 }
 
 
@@ -73,10 +67,6 @@ def bounds(rows: Rows) -> Table:
             add(f"{what}: force at the radius", worst(fine, "force_error"), 0.01)
             add(f"{what}: force at the indentation", worst(given, "given_error"), 0.01)
             add(f"{what}: pull-off", worst(off, "pull_off_error"), 0.005)
-    jumps = [row for row in rows["wave"] if row["control"] == "load"]
-    add("Guduru's waves: force at the jumps under load", worst(jumps, "force_error"), 0.02)
-    add("wave along the front: stress intensity", worst(rows["along"], "error"), 0.03)
-    add("wave across the front, 24 cells: stress intensity", worst(rows["across"][-1:], "amplitude_error"), 0.03)
     errors = ("area_error", "gap_error", "force_error")
     add("ContactMechanics: area, gap and force", worst(rows["without_adhesion"], *errors), 1e-4, "{:.1g}")
     layers = [row for row in rows["without_adhesion"] if row["kind"] == "layer"]
@@ -104,30 +94,16 @@ def cost(rows: Rows) -> Table:
     return Table(["indenter", "grid", "equilibria", "processor"], lines, numbers=True)
 
 
-# Tables with a line for every row of a part: by name, and by part if it has another name.
+# Tables with a line for every row of a part.
 _BY_ROW = {
-    "ellipse": """model: theory s; ratio: ratio of radii g; cells: cells in the radius .3g;
-        indentation: indentation .2f; force_error: force %; area_error: area %""",
-    "ellipse_pull_off ellipse": "model: theory s; ratio: ratio of radii g; pull_off_error: pull-off %",
-    "wave": """wavelength: λ g; amplitude: A g; branch: branch s; control: jump under s; cells: radius in cells .3g;
-        force: force .4f; force_exact: exact .4f; force_error: force error %;
-        indentation_error: indentation error .4f; radius_error: radius error over λ .3f""",
     "without_adhesion": """kind: contact s; thickness: thickness .2g; poisson: ν .2g; area: A/A0 .3f;
         area_error: area .1g; force_error: force .1g; gap_error: gap .1g; kernel_error: compliance .2g""",
     "punch": """square: square (1) or round (0) g; cells: radius in cells g; stiffness: stiffness .4g;
         stiffness_of_nodes: stiffness by nodes .4g; pull_off: pull-off .4g;
         pull_off_of_nodes: pull-off by nodes .4g""",
     "cone": "adhesion: adhesion s; cells: cells in the radius .3g; force_error: force %; approach_error: indentation %",
-    "along": """waves: waves g; cells: radius in cells g; wave_cells: cells in a wave .3g; error: K, circular front %;
-        straight_error: K, straight front %""",
-    "across": """cells: radius in cells .3g; wave_cells: cells in a wave .3g; amplitude_error: K %;
-        phase_error: phase error in degrees .2f""",
     "layer_limits": """limit: limit s; thickness: thickness over √(Rδ) .3g; cells: in cells .3g;
         area_over: A/(πRδ) .3f; force_error: force %""",
-    "balance": """energy: U_full/Δγ g; rms_height: h_rms .3f; expected: 1 − U_full/Δγ g;
-        loading_law: loading, law .3f; unloading_law: unloading, law .3f; loading_contact_radius: loading, a³ .3f;
-        loading_indentation: loading, δ .3f; unloading_contact_radius: unloading, a³ .3f;
-        unloading_indentation: unloading, δ .3f; pull_off: pull-off .3f; loss_over_area: loss/(Δγ A) .3f""",
     "convergence": """grid: grid g; wave_cells: cells in the shortest wave g; steps: equilibria g;
         pull_off: pull-off .4f; loss: loss .3f; largest_area: largest area .3f; seconds: time in s .1f""",
     "direction": """ratio: ratio of works g; model: model s; cells: cells in the radius .3g; kind: pull-off of s;
@@ -136,7 +112,6 @@ _BY_ROW = {
         unattributed: unattributed loss .2%""",
     "front": """work: work of adhesion s; waves: waves of the front g; cells: cells in the radius g;
         shift: shift in cells .3f; error: error of the shift %""",
-    "pinning": "contrast: contrast g; seed_1: seed 1 .4f; seed_2: seed 2 .4f; seed_3: seed 3 .4f",
 }
 _by_radius = partial(
     by_radius, edges=(4, 8, 12), places={"general": single.PLACES[::3], "node, middle": single.PLACES[1:3]}
@@ -153,7 +128,7 @@ def tables(rows: Rows) -> dict[str, Table]:
         "hertz": _by_radius(rows["hertz"], {"area_error": "area", "force_error": "force", "gap_error": "gap"}),
         **{how: _by_radius(by_control[how], at_radius | {"given_error": given[how]}) for how in given},
         "pull_off": _by_radius(rows["pull_off"], {"pull_off_error": "pull-off", "jump_off_error": "jump-off"}),
-        **{name.split()[0]: by(rows[name.split()[-1]], columns) for name, columns in _BY_ROW.items()},
+        **{name: by(rows[name], columns) for name, columns in _BY_ROW.items()},
     }
     return {f"indenter_{name}": table for name, table in found.items()} | {"benchmarks_indenter": cost(rows)}
 

@@ -1,4 +1,4 @@
-"""Rough spheres on a free half-space: convergence with the grid, Dalvi's balance, and computing times.
+"""Rough spheres on a free half-space: convergence with the grid, and computing times.
 
 Units: E* = 1 Pa, dgamma = 1 J/m^2 and a sphere of radius 1 m, as in `validation.indenter_contacts`.
 """
@@ -20,7 +20,6 @@ from icha.boundary_elements.contact import contact_of
 from icha.boundary_elements.elastic import wave_numbers
 from icha.half_space.layer import Layer, layer_compliance
 from icha.references.indentation import sphere_contact, sphere_pull_off
-from icha.references.jkr_fits import fit_work_of_adhesion
 from icha.surfaces.shapes import Paraboloid
 from validation.indenter_contacts import ADHESIVE, BARE, PULL_OFF
 from validation.surfaces import paraboloid
@@ -139,34 +138,6 @@ def directed_sphere(spacing: float | None, ratio: float, radius: float, grid: in
         "pull_off": -force.min() / largest - 1,
         "front": float(run.front_dissipation) / front - 1,
         "unattributed": float(abs(run.loss_unattributed) / run.hysteresis_loss),
-    }
-
-
-def conformal_sphere(energy: float, seed: int, grid: int = 128) -> dict:
-    """Return the balance of energy of a rough sphere: its apparent work of adhesion on loading, and its loss.
-
-    The waves are 0.5 to 1 (dgamma R^2/E*)^(1/3) long. The fits are least-squares fits of a^3 and of the indentation
-    against the force, with the known E*. `conformal` is the part of the contact without gaps inside its outline.
-    """
-    surface = rough_sphere(grid, 8.0, (1.0, 0.5), energy, seed)
-    run = follow(surface, ADHESIVE, 3.0)
-    force, area = (run[name].values * surface.period**2 for name in ("nominal_pressure", "contact_area_fraction"))
-    deepest = int(np.argmax(area))
-    loading = np.flatnonzero(area[: deepest + 1])
-    unloading = np.arange(deepest, deepest + int(np.argmin(force[deepest:])) + 1)
-    row = {"energy": energy, "rms_height": surface.rms_height, "expected": 1 - energy}
-    for branch, part in (("loading", loading), ("unloading", unloading)):
-        for name, values in (("contact_radius", np.sqrt(area / math.pi)), ("indentation", -run.mean_separation.values)):
-            row[f"{branch}_{name}"] = fit_work_of_adhesion(force[part], 1.0, 1.0, **{name: values[part]})
-        # The work of adhesion of the law at force and radius of each state, 0.5 to 1 times the largest radius.
-        a = np.sqrt(area[part] / math.pi)
-        wide = a > 0.5 * a.max()
-        local = (4 / 3 * a[wide] ** 3 - force[part][wide]) ** 2 / (8 * math.pi * a[wide] ** 3)
-        row[f"{branch}_law"] = float(np.mean(local))
-    return row | {
-        "pull_off": -force.min() / PULL_OFF,
-        "loss_over_area": float(run.hysteresis_loss) * surface.period**2 / float(area.max()),
-        "failed_checks": run.attrs.get("failed_checks", ""),
     }
 
 

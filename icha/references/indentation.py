@@ -10,6 +10,11 @@ equals the work of adhesion w (D. Maugis, Contact, Adhesion and Rupture of Elast
 
     delta = delta_1 - sqrt(2 pi a w/E*),    F = F_1 - sqrt(8 pi E* w a^3).
 
+Further sources: H. Hertz, J. Reine Angew. Math. 92 (1882) 156; K. L. Johnson, Contact Mechanics, Cambridge 1985; K. L.
+Johnson, K. Kendall and A. D. Roberts, Proc. R. Soc. Lond. A 324 (1971) 301, doi:10.1098/rspa.1971.0141; K. Kendall, J.
+Phys. D: Appl. Phys. 4 (1971) 1186, doi:10.1088/0022-3727/4/8/320; D. Maugis and M. Barquins, J. Phys. Lett. 42 (1981)
+L95.
+
 All functions accept arrays that broadcast. `contact_modulus` is E*, Pa; `work_of_adhesion` is w, J/m^2. Forces are
 positive in compression, indentations are positive towards the half-space.
 """
@@ -21,20 +26,11 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.special import struve
 
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
 from icha.support.formatting import format_quantity
-from icha.surfaces.shapes import Cone, CylinderPunch, FlatPunch, Paraboloid, Shape, Wave
-
-HERTZ = "H. Hertz, J. Reine Angew. Math. 92 (1882) 156; K. L. Johnson, Contact Mechanics, Cambridge 1985, chapter 4"
-JOHNSON_KENDALL_ROBERTS = (
-    "K. L. Johnson, K. Kendall and A. D. Roberts, Proc. R. Soc. Lond. A 324 (1971) 301, doi:10.1098/rspa.1971.0141"
-)
-KENDALL = "K. Kendall, J. Phys. D: Appl. Phys. 4 (1971) 1186, doi:10.1088/0022-3727/4/8/320"
-MAUGIS_BARQUINS = "D. Maugis and M. Barquins, J. Phys. Lett. 42 (1981) L95"
-GUDURU = "P. R. Guduru, J. Mech. Phys. Solids 55 (2007) 445, doi:10.1016/j.jmps.2006.09.004"
+from icha.surfaces.shapes import Cone, CylinderPunch, FlatPunch, Paraboloid, Shape
 
 # Gauss-Legendre quadrature of Sneddon's integrals over the angle arcsin(r/a) in [0, pi/2].
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(256)
@@ -241,18 +237,3 @@ def cone_jump_off(half_angle, contact_modulus, work_of_adhesion) -> ContactState
     """Return the state of the smallest indentation of a cone, delta = -w tan(half_angle)/E*, from `cone_contact`."""
     a = 2 / np.pi * work_of_adhesion / contact_modulus * np.tan(half_angle) ** 2
     return cone_contact(a, half_angle, contact_modulus, work_of_adhesion)
-
-
-def wave_contact(contact_radius, wave: Wave, contact_modulus, work_of_adhesion=0.0) -> ContactState:
-    """Return the equilibria of a paraboloid with concentric waves, the problem of Guduru (2007), in closed form.
-
-    With Struve's functions H_0 and H_1, q = 2 pi/lambda and z = q a, Sneddon's integrals of f' = r/R + A q sin(q r)
-    are delta_1 = a^2/R + (pi/2) A z H_0(z) and F_1 = E* [4 a^3/(3 R) + pi A a z (H_0(z) - H_1(z)/z)]. The contact is
-    assumed to be one circle. This holds on unloading from a complete contact; on loading it holds for waves whose
-    slopes are nowhere negative, f' >= 0.
-    """
-    a, z = np.asarray(contact_radius, float), 2 * np.pi * np.asarray(contact_radius, float) / wave.wavelength
-    indentation = a**2 / wave.radius + np.pi / 2 * wave.amplitude * z * struve(0, z)
-    waves = np.pi * wave.amplitude * a * (z * struve(0, z) - struve(1, z))
-    force = contact_modulus * (4 / 3 * a**3 / wave.radius + waves)
-    return _with_adhesion(a, indentation, force, contact_modulus, work_of_adhesion)

@@ -53,12 +53,6 @@ def test_cone_follows_sneddon_and_maugis():
             assert abs(row["approach_error"]) < 0.01, row
 
 
-def test_small_waves_along_and_across_the_front_change_its_stress_intensity():
-    along = contacts.ripples_along(20, 10)
-    assert abs(along["error"]) < 0.03
-    assert abs(along["straight_error"]) < 0.03
-
-
 def test_rough_square_without_adhesion_solves_the_dense_problem():
     """Independent solution: least squares without negative pressures, with Love's matrix by Boussinesq's integral."""
     grid, modulus, separation = 20, 3.0, 0.05
