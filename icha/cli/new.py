@@ -96,8 +96,9 @@ def _schema() -> Path:
 
 def _print_section(section: dict) -> None:
     """Print the description of a scan, and the keys that the user must fill in."""
-    to_scale = not section["to_fill_in"].keys() - {"boundary", "scattered"}
-    for line in describe_scan(section["name"], section["scan"], to_scale=to_scale):
+    missing = section["to_fill_in"].keys()
+    known = {"to_scale": not missing - {"boundary", "scattered"}, "sized": "size" not in missing}
+    for line in describe_scan(section["name"], section["scan"], **known):
         echo(line)
     for key, reason in section["to_fill_in"].items():
         echo(f"to fill in: surfaces.{section['name']}.{key} ({reason})", fg="yellow")

@@ -52,7 +52,9 @@ def show_first_lines(path: Path) -> Iterator[str]:
         yield f"  {text[:SHOWN_WIDTH]}{' …' if len(text) > SHOWN_WIDTH else ''}"
 
 
-def describe_scan(name: str, scan, *, to_scale: bool = True, models: Iterable[Model] = ()) -> Iterator[str]:
+def describe_scan(
+    name: str, scan, *, to_scale: bool = True, sized: bool = True, models: Iterable[Model] = ()
+) -> Iterator[str]:
     """Return the lines in which `icha new` and `icha describe` describe a scan.
 
     Parameters
@@ -60,10 +62,13 @@ def describe_scan(name: str, scan, *, to_scale: bool = True, models: Iterable[Mo
     name : name of the surface.
     scan : resolution of the scan (`icha.surfaces.measured.resolution.ScanResolution`).
     to_scale : whether the units of the heights and of the side lengths are known.
+    sized : whether the ratio of the side lengths of pixels is known.
     models : contact models of the runs on the surface; empty if no runs are defined yet.
     """
     lines = [*_reading(scan, to_scale), *_defects(scan, to_scale)]
-    if not keys_for_defects(scan):
+    if not sized:
+        lines.append("summits, waves and directions depend on `size`; with it, `icha describe` prints them")
+    elif not keys_for_defects(scan):
         lines += [*_resolution(scan, to_scale, list(models)), *(_noise(scan) if to_scale else ())]
     return (f"{name}: {line}" for line in lines)
 
@@ -93,8 +98,6 @@ def _reading(scan, to_scale: bool) -> Iterator[str]:
 
 def _defects(scan, to_scale: bool) -> Iterator[str]:
     """Yield lines on outliers, offsets of scan lines and curvature: what was removed, or the keys that remove them."""
-    from icha.surfaces.moments import slope_anisotropy
-
     defects, settings = scan.defects, scan.settings
     if found := defects.description_of_outliers:
         removed = found.replace(",", " replaced,", 1)
@@ -116,11 +119,6 @@ def _defects(scan, to_scale: bool) -> Iterator[str]:
         yield f"{taken}{' and was removed' if settings.detrend == 'curvature' else advice}"
     if left := " and ".join(f"`{key}`" for key in keys_for_defects(scan)):
         yield f"write {left}; then `icha describe` judges the surface without the defects"
-    elif (anisotropy := slope_anisotropy(scan.surface)) > ANISOTROPIC:
-        yield (
-            f"anisotropic: the largest rms slope of all directions is {anisotropy:.2g} times the smallest; the "
-            "asperity model has been validated for isotropic surfaces only"
-        )
 
 
 def keys_for_defects(scan) -> list[str]:
@@ -131,12 +129,18 @@ def keys_for_defects(scan) -> list[str]:
 
 
 def _resolution(scan, to_scale: bool, models: list[Model]) -> Iterator[str]:
-    """Yield lines on the resolution of summits and waves, and on models that are not applicable."""
+    """Yield lines on anisotropy, on the resolution of summits and waves, and on models that are not applicable."""
     import numpy as np
 
+    from icha.surfaces.moments import slope_anisotropy
     from icha.surfaces.resolution import RECOMMENDED_CELLS
     from icha.surfaces.summits import SummitCoverage
 
+    if (anisotropy := slope_anisotropy(scan.surface)) > ANISOTROPIC:
+        yield (
+            f"anisotropic: the largest rms slope of all directions is {anisotropy:.2g} times the smallest; the "
+            "asperity model has been validated for isotropic surfaces only"
+        )
     used, unsupported = scan.surface, len(scan.asperities.unsupported_height)
     summits = len(scan.asperities) + unsupported
     scale = f" {formatting.length(used.spacing)} apart, rms slope {used.rms_slope:.3g}" if to_scale else ""

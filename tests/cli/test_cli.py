@@ -180,6 +180,7 @@ def test_a_text_is_shown_and_what_is_missing_is_asked(project):
     written = output("new", "one", "--measured", "scan.txt")
     assert "scan.txt begins with:\n  Width: 20 um\n  Lines: 24\n  Unit: nm\n" in written
     assert "read as matrix" in written and "to fill in: surfaces.scan.size (is missing" in written
+    assert "depend on `size`" in written and "summits, about" not in written and "anisotropic" not in written
     Path("numbered.csv").write_text(
         "\n".join([",".join(map(str, range(24))), *(row.replace(" ", ",") for row in rows)])
     )
