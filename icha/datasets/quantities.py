@@ -79,7 +79,7 @@ _QUANTITIES = {
     "pull_off_force": Quantity("pull-off force", "", "N"),
     "hysteresis_loss": Quantity("hysteresis loss", "", "J m^-2"),
     "hysteresis_loss_over_surface_energy": Quantity(r"hysteresis loss over $\Delta\gamma$"),
-    "loss_over_contact": Quantity("loss divided by contact area and surface energy"),
+    "loss_over_contact": Quantity("loss divided by contact area and advancing work"),
     "loss_by_jump_in": Quantity("jump-in", "", "J m^-2"),
     "loss_by_jump_off": Quantity("jump-off", "", "J m^-2"),
     "loss_by_coalescence": Quantity("coalescence", "", "J m^-2"),

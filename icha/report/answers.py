@@ -19,7 +19,7 @@ from icha.uncertainty.sensitivity import response_words
 
 # Largest ratio of half-width and absolute value of an interval that is printed with ±. Wider intervals need not be
 # symmetric, so their ends are printed.
-_WIDE = 0.3
+_WIDE = 0.1
 
 
 class Answer(NamedTuple):

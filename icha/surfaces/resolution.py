@@ -73,7 +73,7 @@ class Resolution(NamedTuple):
         if self.reaches(RECOMMENDED_CELLS):
             return ""
         if self.reaches(LEAST_CELLS):
-            return "a few per cent"
+            return "up to a few per cent"
         if self.of == RADIUS:
             return "12 % or more"
         return "up to a quarter" if self.representable else "up to a factor of two"

@@ -211,10 +211,10 @@ def test_tensile_forces_have_their_lower_end_first(answers):
         row = answers["one"].to_dataset().isel(answer=[0])
         return row.assign({name: ("answer", [value]) for name, value in values.items()})
 
-    narrow = force(-70e-6, -46e-6)
+    narrow = force(-63e-6, -53e-6)
     (answer,) = answers_of(narrow)
-    assert answer.estimate == "-58 µN ± 12 µN"
+    assert answer.estimate == "-58.0 µN ± 5.0 µN"
     assert answer.shares["seeds"] == pytest.approx(11.6)
     assert answers_of(force(-84e-6, -32e-6))[0].estimate == "-58 µN, from -84 to -32 µN"
     latex = answers_table([answer]).as_latex()
-    assert r"$-$58 µN $\pm$ 12 µN" in latex
+    assert r"$-$58.0 µN $\pm$ 5.0 µN" in latex
