@@ -196,7 +196,8 @@ def numbers_of(
             try:
                 numbers.append(bounds.validate("", _number(row[column], decimal)))
             except ValueError:
-                text = f"column {name}, line {line}: {row[column][:40]!r}; expected {bounds.expected}"
+                text = f"column {name}, line {line}: {row[column][:40]!r}; expected {bounds.expected}. Correct or "
+                text += "remove the line"
                 raise ValueError(text) from None
         found.append(np.array(numbers))
     return found
