@@ -22,17 +22,20 @@ from validation.tables import Table, write_tables
 
 RESULTS = Path(__file__).resolve().parent / "results/jkr_test.json"
 TESTS, POINTS, NOISE = 200, 50, 0.02
-# Measured columns, whether the offset of the indentation is known, whether the noise is a share of each value instead
-# of a share of the largest value, and the range of the load divided by the pull-off force.
+# Standard deviation of the noise is a share of these values of a column.
+SIZES = {"largest": lambda values: np.abs(values).max(), "range": np.ptp, "each": np.abs}
+# Measured columns, whether the offset of the indentation is known, size of the noise, and the range of the load divided
+# by the pull-off force.
 CASES = {
-    "contact radius": (["contact_radius"], True, False, (1, 10)),
-    "contact radius, noise a share of each value": (["contact_radius"], True, True, (1, 10)),
-    "indentation": (["indentation"], True, False, (1, 10)),
-    "indentation, unknown zero": (["indentation"], False, False, (1, 10)),
-    "both, unknown zero": (["contact_radius", "indentation"], False, False, (1, 10)),
-    "contact radius, load 20": (["contact_radius"], True, False, (20, 20)),
-    "indentation, load 20": (["indentation"], True, False, (20, 20)),
-    "indentation, unknown zero, load 20": (["indentation"], False, False, (20, 20)),
+    "contact radius": (["contact_radius"], True, "largest", (1, 10)),
+    "contact radius, noise a share of each value": (["contact_radius"], True, "each", (1, 10)),
+    "contact radius, noise a share of the range": (["contact_radius"], True, "range", (1, 10)),
+    "indentation": (["indentation"], True, "largest", (1, 10)),
+    "indentation, unknown zero": (["indentation"], False, "largest", (1, 10)),
+    "both, unknown zero": (["contact_radius", "indentation"], False, "largest", (1, 10)),
+    "contact radius, load 20": (["contact_radius"], True, "largest", (20, 20)),
+    "indentation, load 20": (["indentation"], True, "largest", (20, 20)),
+    "indentation, unknown zero, load 20": (["indentation"], False, "largest", (20, 20)),
 }
 QUANTITIES = {"contact_modulus": "*E\\**", "advancing_work": "advancing Δγ", "receding_work": "receding Δγ"}
 
@@ -63,13 +66,13 @@ def exact_test(
     return {"force": force, "contact_radius": contact, "indentation": contact**2 / radius - lift}
 
 
-def noisy_test(exact: Mapping[str, np.ndarray], rng, columns, offset=0.0, *, by_value=False) -> dict[str, np.ndarray]:
+def noisy_test(exact: Mapping[str, np.ndarray], rng, columns, offset=0.0, size="largest") -> dict[str, np.ndarray]:
     """Return the force and other columns of a test with normal noise; indentations are moved by an offset, m."""
     found = {}
     for name in ("force", *columns):
         values = exact[name]
-        size = np.abs(values) if by_value else np.abs(values).max()
-        found[name] = values + NOISE * size * rng.standard_normal(len(values)) + offset * (name == "indentation")
+        noise = NOISE * SIZES[size](values) * rng.standard_normal(len(values))
+        found[name] = values + noise + offset * (name == "indentation")
     return found
 
 
@@ -85,14 +88,14 @@ def random_truth(rng, loads: tuple[float, float]) -> dict[str, float]:
 def measure(tests: int) -> list[dict]:
     """Return, for each case, how often each interval contains the truth, and the median width of the intervals."""
     rows = []
-    for case, (columns, known, by_value, loads) in CASES.items():
+    for case, (columns, known, size, loads) in CASES.items():
         inside, widths = {name: [] for name in QUANTITIES}, {name: [] for name in QUANTITIES}
         rng = np.random.default_rng(1)
         for _ in range(tests):
             truth = random_truth(rng, loads)
             exact = exact_test(**truth)
             offset = 0.0 if known else 0.3 * float(exact["indentation"].max())
-            table = noisy_test(exact, rng, columns, offset, by_value=by_value)
+            table = noisy_test(exact, rng, columns, offset, size)
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", icha.IchaWarning)
                 test = icha.fit_jkr_test(table, truth["radius"], indentation_offset=0.0 if known else None)

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from icha.cli.project import UserError, echo, option, shorten_path
+from icha.support.usual import USUAL, IchaWarning
 
 
 def _length(text: str) -> float:
@@ -17,20 +18,35 @@ def _length(text: str) -> float:
         raise typer.BadParameter(f"{text}: {error}; expected a length with its unit, such as '5 mm'") from None
 
 
+def _usual_length(name):
+    def parse(text: str) -> float:
+        if USUAL[name].least <= (length := _length(text)) <= USUAL[name].most:
+            return length
+        raise typer.BadParameter(f"{text}: expected {USUAL[name]}")
+
+    return {"parser": parse, "metavar": "<length>"}
+
+
 def _pair(text: str) -> list[str]:
     if "=" not in text:
         raise typer.BadParameter(f"{text}: expected a quantity, = and a text, such as 'force=mN'")
     return text.split("=", 1)
 
 
-LENGTH = {"parser": _length, "metavar": "<length>"}
 PAIR = {"parser": _pair, "metavar": "<quantity=text>"}
-Radius = Annotated[float, option("Radius of the lens with its unit, such as '5 mm'.", **LENGTH)]
+Radius = Annotated[float, option("Radius of the lens with its unit, such as '5 mm'.", **_usual_length("radius"))]
 Columns = Annotated[list[object] | None, option("Heading: 'force=Load cell (mN)'; may be repeated.", **PAIR)]
 Units = Annotated[list[object] | None, option("Unit that a heading lacks: 'force=mN'; may be repeated.", **PAIR)]
-Offset = Annotated[float | None, option("Indentation at the undeformed plane. Default: fitted.", **LENGTH)]
-Range = Annotated[float | None, option("Range of attraction, for the Tabor parameter. Default: 0.5 nm.", **LENGTH)]
-Thickness = Annotated[float | None, option("Thickness of an elastic layer. Default: a half-space.", **LENGTH)]
+Offset = Annotated[
+    float | None, option("Indentation at the undeformed plane. Default: fitted.", parser=_length, metavar="<length>")
+]
+Range = Annotated[
+    float | None,
+    option("Range of attraction, for the Tabor parameter. Default: 0.5 nm.", **_usual_length("interaction_range")),
+]
+Thickness = Annotated[
+    float | None, option("Thickness of an elastic layer. Default: a half-space.", **_usual_length("thickness"))
+]
 Roughness = Annotated[Path | None, option("File with a measured topography. Default: smooth.")]
 
 
@@ -56,7 +72,6 @@ def jkr(
     from icha.figures.quick import plot_jkr_test
     from icha.figures.style import save
     from icha.references.jkr_test import fit_jkr_test
-    from icha.support.usual import IchaWarning
 
     limits = {"interaction_range": interaction_range, "thickness": thickness}
     settings = {name: value for name, value in limits.items() if value is not None}

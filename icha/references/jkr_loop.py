@@ -7,7 +7,8 @@ Maugis and M. Barquins, J. Phys. D: Appl. Phys. 11 (1978) 1989, doi:10.1088/0022
 
 All measured quantities have errors, so a fit minimises the squared distances between points and curves, each quantity
 divided by its error (P. T. Boggs, R. H. Byrd and R. B. Schnabel, SIAM J. Sci. Stat. Comput. 8 (1987) 1052,
-doi:10.1137/0908085). Intervals are those of the linear approximation at the fit, with Student's t.
+doi:10.1137/0908085). Intervals are those of the linear approximation at the fit, with Student's t, for the larger
+of two variances: with equal errors of all points, and with errors that may differ between points.
 """
 
 from __future__ import annotations
@@ -31,6 +32,9 @@ _GUESSES = (0.5, 1.0, 2.0), (1.0, 3.0), (0.03, 0.3, 1.0)
 _REFINED, _CONVERGENCE = 3, {"ftol": 1e-6, "xtol": 1e-6}
 # Step of numerical derivatives, not much narrower than the distance between states.
 _STEP = 1e-3
+# Largest ratio of the ends of the interval of a modulus; wider ones are far beyond the linear approximation. Largest
+# leverage of a point in its interval: the residual of a point that alone determines a value shows no error.
+_WIDEST, _MOST_LEVERAGE = 10.0, 0.5
 
 
 class Loop(NamedTuple):
@@ -89,6 +93,11 @@ def fit_loop(
     -------
     Fitted loop, and loops with the lower and the upper ends of the intervals; the nearest state of the fitted loop to
     each point, (quantity, n); the branch of this state, (n,) text.
+
+    Raises
+    ------
+    ValueError
+        If the points do not determine the contact modulus.
     """
     force, scales = points["force"], np.array([errors[name] for name in points])
     data, top, unloads = np.stack(list(points.values()), axis=-1) / scales, int(np.argmax(force)), bool(unloading.any())
@@ -127,8 +136,20 @@ def fit_loop(
     fits = [least_squares(residuals, guess, derivatives, **_CONVERGENCE) for guess in guesses[:_REFINED]]
     fit = min(fits, key=lambda each: each.cost)
     freedom = data.size - len(data) - np.count_nonzero(fit.jac.any(axis=0))
-    variance = 2 * fit.cost / freedom * (np.linalg.pinv(fit.jac) ** 2).sum(axis=1)
+    inverse = np.linalg.pinv(fit.jac)
+    variance = 2 * fit.cost / freedom * (inverse**2).sum(axis=1)
+    # Points may scatter more where they matter, as forces do near pull-off: squared changes without each of the points
+    # (J. G. MacKinnon and H. White, J. Econometrics 29 (1985) 305, doi:10.1016/0304-4076(85)90158-7).
+    change = (inverse * fit.fun).reshape(len(inverse), *data.shape).sum(axis=2)
+    leverage = (inverse * fit.jac.T).reshape(len(inverse), *data.shape).sum(axis=(0, 2))
+    variance = np.maximum(variance, ((change / (1 - np.minimum(leverage, _MOST_LEVERAGE))) ** 2).sum(axis=1))
     width = student.ppf((1 + probability) / 2, freedom) * np.sqrt(variance)
+    if 2 * width[0] > math.log(_WIDEST):
+        raise ValueError(
+            "the points do not determine the contact modulus: the ends of its interval differ by a factor of more than "
+            f"{_WIDEST:.0f}; expected points that follow the law of JKR. Check signs, units and outliers, or measure "
+            "contact radius and indentation"
+        )
     roots = np.array([False, True, True, False, False])
     unknown, least = np.where(roots, np.abs(fit.x), fit.x), np.where(roots, 0.0, -np.inf)
     loops = [loop_of(np.maximum(unknown + sign * width, least)) for sign in (0, -1, 1)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import unicodedata
@@ -26,6 +27,9 @@ _HEADINGS = {
 _LOADING = "loading", "load", "approach", "advancing", "in"
 _UNLOADING = "unloading", "unload", "retraction", "retract", "receding", "out"
 _BRANCH = f"expected {_LOADING[0]} or {_UNLOADING[0]} (also {', '.join(_LOADING[1:] + _UNLOADING[1:])})"
+
+# A number that exceeds every other one in its column by this factor is not a measured value.
+_FAR = 30
 
 
 class Points(NamedTuple):
@@ -75,6 +79,14 @@ def read_points(table: Any, columns: Mapping[str, str], units: Mapping[str, str]
         for title, array in zip(titles.values(), numbers, strict=True):
             if array.shape != (len(places),) or array.dtype.kind not in "fiu" or not np.isfinite(array).all():
                 raise ValueError(f"column {title!r}: expected a list of {len(places)} finite numbers")
+    for title, array in zip(titles.values(), numbers, strict=True):
+        size = np.abs(array)
+        largest = int(np.argmax(size))
+        if size[largest] > _FAR * max(size[size < size[largest]], default=math.inf):
+            raise ValueError(
+                f"column {title!r}, {places[largest]}: {array[largest]:.6g} is more than {_FAR} times every other "
+                "number; expected measured values. Correct or remove the points that mark missing values by it"
+            )
     unloading = None
     if title := found.get("branch"):
         texts = [str(text).strip().lower() for text in by_title[title]]

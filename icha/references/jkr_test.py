@@ -20,7 +20,7 @@ from icha.references.jkr_loop import Loop, fit_loop
 from icha.references.jkr_tables import Points, read_points
 from icha.support.formatting import choose_unit, format_count
 from icha.support.rules import INDENTATIONS, LENGTH, POSITIVE
-from icha.support.usual import IchaWarning, unusual_arguments
+from icha.support.usual import USUAL, IchaWarning, unusual_arguments
 from icha.surfaces.shapes import Sphere
 
 if TYPE_CHECKING:
@@ -35,8 +35,13 @@ _JUMP_OFF_SHARE = 0.5
 _CLEAR_TENSION = 4.0
 # Largest relative error of the force without a warning, by the curvature of the sphere and by the thickness of a layer.
 _FORCE_ERROR = 0.02
+# Smallest work of adhesion without a warning, J/m^2.
+_LEAST_WORK = 1e-3
 # Largest force over the pull-off force without a warning; docs/estimates.md gives the intervals of larger loads.
 _MOST_FORCE = 12.0
+# A table is sorted if one of its columns never decreases, although another one does before the largest force: by more
+# than the first number times its range, at more than the second number times the number of points.
+_DECREASE, _DECREASES = 0.1, 0.1
 # Neighbouring residuals are not random if their correlation exceeds the first number, and the second number divided by
 # the root of the number of points. Smaller residuals than the third number, in units of the errors, are rounded.
 _CORRELATION, _BY_CHANCE, _ROUNDING = 0.3, 2.5, 1e-4
@@ -104,6 +109,8 @@ class JKRTest:
             "offset of the indentation": (self.indentation_offset, "m"),
         }
         lines = [f"{name:<28} {value.text(unit)}" for name, (value, unit) in values.items() if value]
+        stiff = " and an instrument without compliance" * ("indentation" in self.measured)
+        lines.append(f"intervals are those of random errors, with a correct zero of the force{stiff}")
         lines.append("points: " + ", ".join(f"{count} {use}" for use, count in self.counts.items()))
         return "\n".join([*lines, *(f"warning: {text}" for text in self.warnings)])
 
@@ -137,7 +144,7 @@ def fit_jkr_test(
     units : units by quantity, if the headings have none.
     indentation_offset : indentation of the table where the lens touches the undeformed plane, m; None to fit it.
     errors : standard deviation of each quantity, in SI units; only their ratios have an effect. Default: the same
-        fraction of the range of each quantity.
+        fraction of the largest contact radius, and of the ranges of force and indentation.
     interaction_range : range of the attraction, m, for the warning of small Tabor parameters.
     thickness : thickness of an elastic layer, m; infinite for a half-space.
     roughness : surface with the roughness of lens and sample, for the warning of rough surfaces.
@@ -160,17 +167,20 @@ def fit_jkr_test(
     try:
         points = read_points(table, columns or {}, units or {})
         used_for, unloading = _choose_points(points, radius)
+        used, measured = used_for == "", points.values
+        chosen = {quantity: values[used] for quantity, values in measured.items()}
+        if not errors:
+            sizes = {name: max(each) if name == "contact_radius" else np.ptp(each) for name, each in chosen.items()}
+            errors = {name: float(size) for name, size in sizes.items()}
+        elif missing := chosen.keys() - errors.keys():
+            raise ValueError(f"errors: no value for {min(missing)}; expected one for {', '.join(chosen)}")
+        errors = {name: POSITIVE.validate(f"errors, {name}", errors[name]) for name in chosen}
+        loops, near, used_for[used] = fit_loop(chosen, unloading[used], errors, radius, indentation_offset, PROBABILITY)
+        if loops[0].contact_modulus > USUAL["contact_modulus"].most:
+            raise ValueError(*unusual_arguments({"contact_modulus": loops[0].contact_modulus}))
     except ValueError as error:
         name = os.fspath(table) if isinstance(table, str | os.PathLike) else "table"
         raise ValueError(f"{name}: {error}") from None
-    used, measured = used_for == "", points.values
-    chosen = {quantity: values[used] for quantity, values in measured.items()}
-    if not errors:
-        errors = {name: float(max(each) if name == "contact_radius" else np.ptp(each)) for name, each in chosen.items()}
-    elif missing := chosen.keys() - errors.keys():
-        raise ValueError(f"errors: no value for {min(missing)}; expected one for {', '.join(chosen)}")
-    errors = {name: POSITIVE.validate(f"errors, {name}", errors[name]) for name in chosen}
-    loops, near, used_for[used] = fit_loop(chosen, unloading[used], errors, radius, indentation_offset, PROBABILITY)
     fitted = {name: np.full(len(used), np.nan) for name in chosen}
     for name, nearest in zip(chosen, near, strict=True):
         fitted[name][used] = nearest
@@ -196,10 +206,20 @@ def _choose_points(points: Points, radius: float) -> tuple[np.ndarray, np.ndarra
             f"{places[bottom]}, the smallest force, looks like the largest load; expected forces that are positive in "
             "compression. Change the sign of the forces"
         )
+    if "indentation" in values and values["indentation"][bottom] > values["indentation"][top]:
+        raise ValueError(
+            f"{places[bottom]}, the smallest force, has a larger indentation than {places[top]}, the largest force; "
+            "expected indentations that are positive towards the sample. Change the sign of the indentations"
+        )
     if contact is not None and (large := np.flatnonzero(contact >= radius)).size:
         raise ValueError(
             f"contact radius, {places[large[0]]}: {contact[large[0]]:.4g} m is not less than the radius of the lens, "
             f"{radius:.4g} m. Check the units, and that the column contains radii, not diameters or areas"
+        )
+    if points.unloading is None and (column := _sorted_column(values, top)):
+        raise ValueError(
+            f"is sorted by {column}, so neighbouring points jump between loading and unloading; expected the points "
+            "in the order of the test. Restore this order, or add a column `branch`"
         )
     if points.unloading is None and (again := _second_loading(force)) is not None:
         raise ValueError(
@@ -209,8 +229,18 @@ def _choose_points(points: Points, radius: float) -> tuple[np.ndarray, np.ndarra
     unloading = np.arange(len(force)) > top if points.unloading is None else points.unloading
     if contact is not None:
         left_out = np.where(contact == 0, "without contact", "").astype(object)
+        used = np.flatnonzero(contact)
+        if points.unloading is None and (gaps := np.flatnonzero(np.diff(used) > 1)).size:
+            raise ValueError(
+                f"contact radius, {places[used[gaps[0]] + 1]}: 0 between points with contact; expected 0 only before "
+                "and after the contact. Remove the points without a measured radius"
+            )
     else:
         left_out = _without_contact(force, unloading)
+    # Noise at the turning point is not unloading.
+    if 0 < (unloading & (left_out == "")).sum() < LEAST_POINTS:
+        left_out[unloading & (left_out == "")] = f"unloading (fewer than {LEAST_POINTS})"
+        unloading = np.zeros_like(unloading)
     kept, unknowns = left_out == "", 2 + (contact is None) + 2 * bool(unloading.any())
     loading = int(np.sum(kept & ~unloading))
     if loading < LEAST_POINTS or kept.sum() <= unknowns:
@@ -222,6 +252,14 @@ def _choose_points(points: Points, radius: float) -> tuple[np.ndarray, np.ndarra
     if constant := [quantity for quantity, column in values.items() if not np.ptp(column[kept]) > 0]:
         raise ValueError(f"column of {constant[0]}: all values are the same; expected measured values")
     return left_out, unloading
+
+
+def _sorted_column(values, top):
+    """Return the column by which a table is sorted, so that the order of the test is lost; None without one."""
+    steps = {name: np.diff(column) for name, column in values.items()}
+    decreases = max(np.sum(each[:top] < -_DECREASE * np.ptp(values[name])) for name, each in steps.items())
+    is_lost = decreases >= max(LEAST_POINTS, _DECREASES * top)
+    return next((name for name, each in steps.items() if is_lost and (each >= 0).all()), None)
 
 
 def _second_loading(force):
@@ -254,8 +292,16 @@ def _warnings(test, errors, interaction_range, thickness, roughness) -> Iterator
     unloading, largest = np.isin(test.used_for, ["stuck", "receding"]), test.loop.stuck_radius
     work = max(advancing, test.receding_work.value if test.receding_work else 0.0)
     yield from unusual_arguments({"radius": test.radius, "contact_modulus": modulus, "surface_energy": work})
+    if 0 < work < _LEAST_WORK:
+        yield (
+            f"the work of adhesion, {1e3 * work:.2g} mJ/m², is less than {1e3 * _LEAST_WORK:g} mJ/m²; expected 10 to "
+            "200 mJ/m² between smooth surfaces. Check the units of the radius and of the columns"
+        )
     if not unloading.any():
-        yield "there are no points of unloading with contact, so there is no receding work of adhesion"
+        yield (
+            f"fewer than {LEAST_POINTS} points of unloading have contact, so there is no receding work of adhesion; "
+            "measure up to pull-off"
+        )
     elif not test.receding_work:
         last = np.flatnonzero(unloading)[np.argmin(test.measured["force"][unloading])]
         rate = sphere_energy_release_rate(test.fitted["force"][last], largest, test.radius, modulus)

@@ -116,10 +116,13 @@ def test_points_without_contact_are_left_out_and_counted():
 
 def test_without_unloading_there_is_only_the_advancing_work():
     table = {name: EXACT[name][:20] for name in ("force", "contact_radius")}
-    with pytest.warns(icha.IchaWarning, match="no points of unloading"):
+    # The turning point and one lower force are not unloading.
+    table = {name: np.append(each, 0.99 * each[-1]) for name, each in table.items()}
+    with pytest.warns(icha.IchaWarning, match="fewer than 3 points of unloading have contact"):
         test = icha.fit_jkr_test(table, RADIUS)
     assert test.receding_work is None and "receding" not in str(test).split("warning")[0]
-    assert test.advancing_work.value == pytest.approx(0.03, rel=1e-3) and set(test.counts) == {"loading"}
+    assert test.advancing_work.value == pytest.approx(0.03, rel=1e-3) and test.counts.pop("loading") == 20
+    assert test.counts["unloading (fewer than 3)"] == 1
 
 
 def test_a_stuck_contact_gives_a_lower_bound_of_the_receding_work():
@@ -143,7 +146,6 @@ def test_a_stuck_contact_gives_a_lower_bound_of_the_receding_work():
         ({"interaction_range": 1e-5}, {}, "at the Tabor parameter"),
         ({"roughness": "rough"}, {}, r"U_full/Δγ = .* apparent"),
         ({}, {"receding": 0.02}, "less than the advancing one"),
-        ({}, {"modulus": 1e13, "load": 1e3}, "contact_modulus: .* is unusual"),
     ],
 )
 def test_limits_of_the_law_are_warnings(options, changes, message):
@@ -177,7 +179,7 @@ def test_points_of_another_law_have_correlated_residuals():
     [
         ("force (mN),a (um)\n1,100\n2,nan\n", "column 'a (um)', line 3: 'nan'; expected a number"),
         ("force (mN),a (um)\n1,100\n2,-1\n", "column 'a (um)', line 3: '-1'; expected a number, 0 or greater"),
-        ("force (mN),a (um)\n1,100\n2,120\n3,9000\n4,150\n", "line 4: 0.009 m is not less than the radius of the lens"),
+        ("force (mN),a (um)\n1,200\n2,220\n3,6000\n4,250\n", "line 4: 0.006 m is not less than the radius of the lens"),
         ("force,a (um)\n1,2\n", "column 'force': the unit is missing; expected a unit of force"),
         ("force (um),a (um)\n1,2\n", "'um' is not a unit of force; expected a unit such as mN"),
         (
@@ -198,6 +200,9 @@ def test_points_of_another_law_have_correlated_residuals():
         ),
         ("force (mN),a (um)\n3,100\n2,90\n1,80\n0,70\n", "has 1 point of loading and 3 of unloading with contact"),
         ("force (mN),a (um)\n1,10\n4,20\n-1,5\n3,15\n-1,5\n", "line 5: the force rises for the second time"),
+        ("force (mN),a (um)\n1,1\n2,2\n3,3\n-9999,4\n-9999,5\n", "line 5: -9999 is more than 30 times every other"),
+        ("force (mN),depth (um)\n1,-1\n4,-4\n1,-2\n-1,1\n", "Change the sign of the indentations"),
+        ("force (mN),a (um)\n1,1\n2,0\n3,3\n4,4\n", "line 3: 0 between points with contact"),
         ("force (mN),a (um)\n1,10\n2,10\n3,10\n4,10\n", "contact_radius: all values are the same"),
         ("force (mN),a (um),branch\n1,10,loading\n2,20,hold\n", "column 'branch', line 3: 'hold'; expected loading or"),
     ],
@@ -208,6 +213,46 @@ def test_tables_that_are_no_jkr_test_are_refused(text, message, tmp_path):
     with pytest.raises(ValueError, match=r"test\.csv: ") as error:
         icha.fit_jkr_test(path, RADIUS)
     assert message in str(error.value)
+
+
+def test_a_sorted_table_has_lost_the_order_of_the_test():
+    """Sorting mixes loading and unloading, and a column of the branch separates them."""
+    table = noisy_test(EXACT, np.random.default_rng(1), COLUMNS)
+    order = {name: np.argsort(each) for name, each in table.items()}
+    branch = np.where(np.arange(40) < 20, "loading", "unloading")
+    for name, places in order.items():
+        mixed = {quantity: each[places] for quantity, each in table.items()}
+        with pytest.raises(ValueError, match=f"is sorted by {name}, so neighbouring points jump"):
+            icha.fit_jkr_test(mixed, RADIUS)
+    test = icha.fit_jkr_test(mixed | {"branch": branch[places]}, RADIUS)
+    np.testing.assert_allclose(values(test), list(TRUTH.values()), rtol=0.15)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (
+            {"contact_radius": np.random.default_rng(0).permutation(EXACT["contact_radius"])},
+            "not determine the contact modulus",
+        ),
+        ({"contact_radius": 1e-3 * EXACT["contact_radius"]}, "contact_modulus: .* is unusual"),
+    ],
+)
+def test_fits_without_a_plausible_modulus_are_refused(changes, message):
+    table = {name: EXACT[name] for name in ("force", "contact_radius")} | changes
+    with pytest.raises(ValueError, match=message):
+        icha.fit_jkr_test(table, RADIUS)
+
+
+def test_intervals_do_not_depend_on_wrong_ratios_of_errors():
+    """Contact radii with half of the default error: near pull-off, the error of the force alone matters."""
+    rng, ratios = np.random.default_rng(1), []
+    for _ in range(5):
+        table = noisy_test(EXACT, rng, COLUMNS[:1], size="range")
+        errors = {name: float(np.ptp(EXACT[name])) for name in table}
+        works = [icha.fit_jkr_test(table, RADIUS, errors=each).receding_work for each in (None, errors)]
+        ratios.append((works[0].high - works[0].low) / (works[1].high - works[1].low))
+    assert np.mean(ratios) > 0.9
 
 
 @pytest.mark.parametrize(
@@ -239,6 +284,14 @@ def test_the_command_prints_intervals_and_draws_the_figure(tmp_path, monkeypatch
     assert len(figure.axes) == 6
     drawn = sum(len(line.get_xdata()) for line in figure.axes[0].lines if line.get_marker() in "oDs")
     assert drawn == len(EXACT["force"])
-    for options in (["--radius", "5"], ["--radius", "5 mm", "--unit", "mN"], ["--radius", "5 mm", "--offset", "x"]):
+    assert "intervals are those of random errors, with a correct zero of the force\n" in done.output
+    slip = CliRunner().invoke(app, ["jkr", "test.csv", "--radius", "5 m"])
+    assert "mJ/m², is less than 1 mJ/m²; expected 10 to 200 mJ/m²" in slip.output
+    for options in (
+        ["--radius", "5"],
+        ["--radius", "0 mm"],
+        ["--radius", "5 mm", "--unit", "mN"],
+        ["--radius", "5 mm", "--offset", "x"],
+    ):
         refused = CliRunner().invoke(app, ["jkr", "test.csv", *options])
         assert refused.exit_code == 2 and "expected" in refused.output
