@@ -10,7 +10,7 @@ from icha.support.formatting import format_quantity, html_table
 from icha.support.rules import ADHESION_LENGTH, CONTACT_MODULUS, LENGTH, POISSON_RATIO, SURFACE_ENERGY
 
 # Smallest Tabor parameter for which Wu's distance of the jump into contact is within 0.5 % of the exact distance
-# (`validation/jump_in.py`).
+# (docs/model.md).
 WU_HOLDS_FROM = 1.0
 
 # Default range of attraction, m: about the distance between molecules, where van der Waals forces are strongest (J. N.

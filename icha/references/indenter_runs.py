@@ -129,7 +129,7 @@ def apparent_work_of_adhesion(states: Sequence[Mapping[str, float]], radius: flo
     if len(chosen) < _LEAST_STATES:
         raise NoFit(f"fewer than {_LEAST_STATES} states")
     force, contact_radius = (np.array([states[k][name] for k in chosen]) for name in ("force", "contact_radius"))
-    work = fit_work_of_adhesion(force, radius, material.contact_modulus, contact_radius=contact_radius)
+    work = fit_work_of_adhesion(force, contact_radius, radius, material.contact_modulus)
     if not work:
         raise NoFit("Hertz fits better")
     return work

@@ -10,31 +10,26 @@ import math
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from icha.references.indentation import sphere_contact
-
 # Roots of the work of adhesion at which the sum of squares is computed first, in the unit of the largest force.
 _ROOTS = np.linspace(0.0, math.sqrt(10), 2000) ** 2
 # Sums of squares are equal up to this relative difference.
 _ROUNDING = 1e-12
 
 
-def fit_work_of_adhesion(
-    force: np.ndarray, radius: float, contact_modulus: float, *, contact_radius=None, indentation=None
-) -> float:
+def fit_work_of_adhesion(force: np.ndarray, contact_radius: np.ndarray, radius: float, contact_modulus: float) -> float:
     """Fit the law of Johnson, Kendall & Roberts to forces of a sphere, by least squares; return the work, J/m^2.
 
-    With `contact_radius`, the sum of the squared differences of a^3 is smallest; with `indentation`, that of the
-    indentation. Both are functions of the force on the branch that is stable under load control. Therefore leave out
-    states after the pull-off force, and states without contact. Forces below the pull-off force of the fit, -(3/2) pi w
-    R, are compared with the continuation in which the square root in a^3(F) is zero. The result is 0 if no law with
-    adhesion fits better than Hertz's law.
+    The sum of the squared differences of a^3 is smallest, with a^3 as function of the force on the branch that is
+    stable under load control. Therefore leave out states after the pull-off force, and states without contact. Forces
+    below the pull-off force of the fit, -(3/2) pi w R, are compared with the continuation in which the square root in
+    a^3(F) is zero. The result is 0 if no law with adhesion fits better than Hertz's law.
 
     Parameters
     ----------
     force : (n,), N, negative in tension.
+    contact_radius : (n,), m.
     radius : radius R of the sphere, m.
     contact_modulus : E*, Pa.
-    contact_radius, indentation : (n,), m; one of the two.
     """
     scale = np.max(np.abs(force)) / (1.5 * math.pi * radius)
 
@@ -42,10 +37,7 @@ def fit_work_of_adhesion(
         work = scale * np.asarray(root)[..., None] ** 2
         unit = 3 * math.pi * work * radius
         cube = 0.75 * radius / contact_modulus * (force + unit + np.sqrt(np.maximum(2 * unit * force + unit**2, 0.0)))
-        a = np.cbrt(np.maximum(cube, 0.0))
-        if indentation is None:
-            return np.sum((a**3 - contact_radius**3) ** 2, axis=-1)
-        return np.sum((sphere_contact(a, radius, contact_modulus, work).indentation - indentation) ** 2, axis=-1)
+        return np.sum((np.cbrt(np.maximum(cube, 0.0)) ** 3 - contact_radius**3) ** 2, axis=-1)
 
     # The sum has several minima: one may be where the tension of a state is the pull-off force of the law.
     best = int(np.argmin(misfit(_ROOTS)))
