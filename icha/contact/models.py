@@ -81,7 +81,7 @@ class Model:
     module : module whose `contact_of(surface, material)` returns an `icha.contact.model.ContactModel`.
     folder : folder for the runs of this model, with a slash at the end; empty for the default model.
     variables : names of variables that only runs of this model have, with dimensions, unit, long name and type.
-    stiffness_error : largest relative error of the contact stiffness.
+    stiffness_error : largest relative error of the contact stiffness, apart from the error by the grid.
     by_summits : whether summits represent the surface. If so, spots unite by a rule, which may lose or gain energy.
     by_cells : whether contact is counted in cells of the grid; runs then contain a map of the contact.
     accuracy : accuracy with which a path resolves its events.

@@ -129,7 +129,7 @@ class EnergyBalance:
     coalescence : loss by the coalescence of spots and by the splitting of unions.
     load_jump : loss by jumps at constant load, which happen only under load control.
     front : dissipation of receding fronts, whose work of adhesion is larger than that of advancing fronts.
-    unattributed : all other losses, caused by errors of the integration and of the interaction (see `_CERTAIN_LOSS`).
+    unattributed : all other losses, by jumps of fronts, and by errors of the integration and of the interaction.
     """
 
     work: float = 0.0

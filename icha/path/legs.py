@@ -297,12 +297,12 @@ class _Legs:
                 raise NotConverged("spots would approach as the surfaces move apart: the equilibrium is unstable")
             return state
         except NotConverged as failure:
-            first, count = failure, 1
+            first = failure
         if not self.loading and contact.adhesive and length < CLOSE_TO_A_JUMP * contact.rms_height:
-            while count <= contact.spot_count(start):
+            spots = contact.spot_count(start)
+            for k in range(spots.bit_length() + 1 if spots else 0):
                 with suppress(NotConverged):
-                    return contact.equilibrium(start, separation, let_go=count)
-                count *= 2
+                    return contact.equilibrium(start, separation, let_go=min(2**k, spots))
         raise first
 
     def _is_apart(self):

@@ -212,8 +212,9 @@ class Path:
     turning_points : pairs (kind, value) at which the path turns after its last target: the first one ends unloading,
         the second one ends loading, and so on. The kinds are those of snapshots.
     unload : whether the path ends with complete separation. The last unloading meets again each target between its
-        start and complete separation, except targets inside jumps. If the number of turning points is odd, the last one
-        lies on the last unloading: there the path does not turn, but continues to complete separation.
+        start and complete separation, except targets that the branch after a jump does not reach. If the number of
+        turning points is odd, the last one lies on the last unloading: there the path does not turn, but continues to
+        complete separation.
     control : "separation": the mean separation is prescribed. "load": the load is prescribed. All targets and turning
         points must then be loads, the targets positive, and the path must unload or have turning points. Load control
         follows the curve of separation control, but jumps at constant load where the pressure falls on loading or rises
