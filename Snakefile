@@ -1,6 +1,7 @@
 # ICHA: adhesive rough contact with interacting and coalescing asperities.
 # One configuration file describes one campaign: config/config.yaml, or the file of --configfile. See config/README.md.
 
+import gc
 import os
 import shlex
 import sys
@@ -18,6 +19,9 @@ min_version("9.17")
 # Modules of jobs cannot be replaced either. Snakemake inserts the path of Python into shell commands without quotes.
 os.environ.update(PYTHONSAFEPATH="1")
 sys.executable = shlex.quote(sys.executable)
+
+# Snakemake makes many objects for each file and removes few, so looking for garbage would take a sixth of the time.
+gc.set_threshold(50_000)
 
 
 include: "workflow/rules/common.smk"

@@ -1,5 +1,6 @@
 # Shared by all rules: the campaign, its files and batches, and functions for parameters.
 
+import os
 import sys
 from functools import cache
 from pathlib import Path
@@ -98,7 +99,7 @@ def surfaces_for(runs):
     A batch keeps files that exist, so it does not depend on their surfaces. Otherwise, a batch of surfaces that gets a
     new seed would start all jobs that use its other seeds.
     """
-    return as_outputs(dict.fromkeys(surface for path, surface in runs.items() if not Path(path).exists()))
+    return as_outputs(dict.fromkeys(surface for path, surface in runs.items() if not os.path.exists(path)))
 
 
 def as_outputs(paths):
