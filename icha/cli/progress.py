@@ -36,6 +36,12 @@ class Progress:
     A file counts as finished if its modification time has changed since this object was made. Files that the jobs keep
     do not count, although Snakemake changes their times.
 
+    Parameters
+    ----------
+    items : files that Snakemake may compute, with their states.
+    results : folder of the results.
+    cores : number of cores in use.
+
     Attributes
     ----------
     expected : files that must be computed.
@@ -44,14 +50,6 @@ class Progress:
     """
 
     def __init__(self, items: Iterable[Item], results: Path, cores: int):
-        """Note the present modification times.
-
-        Parameters
-        ----------
-        items : files that Snakemake may compute, with their states.
-        results : folder of the results.
-        cores : number of cores in use.
-        """
         self._work = {str(results / item.path): item.work for item in items if item.may_be_written}
         self.expected = {str(results / item.path) for item in items if item.to_do}
         self._before = {path: _time_of(path) for path in self._work}
@@ -73,17 +71,12 @@ class Progress:
 
     def time_left(self) -> str:
         """Return the expected time until all files are finished, as text."""
-        waiting = [self._work[path] for path in self.expected - self.finished]
-        if not waiting:
+        if not (waiting := self.expected - self.finished):
             return "finishing"
-        now, done = time.time(), sum(self._work[path] for path in self.finished)
-        # Factor by which the files take longer than expected on this machine. If no file was finished for a long time,
-        # the factor grows, because each core is busy with at most one file.
-        slowness = max(
-            ((until - self.start) * self._cores + _PRIOR) / (done + running + _PRIOR)
-            for until, running in ((self._last, 0.0), (now, self._cores * max(waiting)))
-        )
-        left = sum(waiting) * slowness / self._cores - (now - self._last)
+        # Factor by which the finished files have taken longer than expected on this machine.
+        done = sum(self._work[path] for path in self.finished)
+        slowness = ((self._last - self.start) * self._cores + _PRIOR) / (done + _PRIOR)
+        left = sum(self._work[path] for path in waiting) * slowness / self._cores - (time.time() - self._last)
         return f"about {formatting.duration(left)} left" if left > 0 else "longer than expected"
 
 
@@ -112,14 +105,10 @@ def run_process(command: list[str], folder: Path, log: Path, progress: Progress,
             process_group=0,
             preexec_fn=_end_with_parent if sys.platform == "linux" else None,
         )
-
-    def stop(number, frame):
-        raise KeyboardInterrupt
-
     # Signals that are already ignored, for example under nohup, remain ignored.
     for number in _STOP_SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, stop)
+            signal.signal(number, signal.default_int_handler)
     try:
         _show_progress(process, progress, name)
     except KeyboardInterrupt:
@@ -140,11 +129,9 @@ def _show_progress(process: subprocess.Popen, progress: Progress, name: str) -> 
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
     from rich.progress import Progress as Bar
 
-    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
-    printed, shown = time.monotonic(), 0
-    bar = Bar(*columns, transient=True)
+    bar = Bar(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), transient=True)
     bar.disable = not bar.console.is_terminal
-    task = bar.add_task(name)
+    task, printed, shown = bar.add_task(name), time.monotonic(), 0
     with bar:
         while process.poll() is None:
             with contextlib.suppress(subprocess.TimeoutExpired):

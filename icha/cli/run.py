@@ -157,23 +157,22 @@ def _compute(command: list[str], workflow: Path, campaign, results: Path, target
     log = results / "logs/snakemake.log"
     try:
         log.parent.mkdir(parents=True, exist_ok=True)
-        log.touch()
+        begin = log.open("a").tell()
     except OSError as error:
         raise UserError(
             f"cannot write to {results}: {error.strerror}; free some space, change its permissions, or use another "
             "folder: --directory FOLDER"
         ) from None
-    begin = log.stat().st_size
     status, stopped = run_process(command, workflow, log, progress, campaign.name)
     count = len(progress.finished)
-    if count or status:
+    if not count and not status:
+        echo("Nothing to do: all requested results exist and are up to date.")
+    else:
         items = needed_for(targets, plan(campaign, results))
         missing = sum(item.to_do for item in items)
         text = f"{format_count(count, 'file')} computed in {formatting.duration(progress.seconds)}"
         echo(f"{text}, {missing} missing or outdated" if missing else text)
-        _print_early_ends(campaign, results, items)
-    else:
-        echo("Nothing to do: all requested results exist and are up to date.")
+        _print_early_ends(results, items)
     failed = _print_reasons(results, log, begin, progress, stopped) if status else []
     files = {"figures": "figures", "dataset": f"dataset/{campaign.name}.nc", "report": "report.html"}
     for name, file in files.items() if count or not status else ():  # otherwise the files are from an earlier call
@@ -227,34 +226,26 @@ def _print_lines(heading: str, lines: list[str], colour: str | None = "red") -> 
         echo(f"    … and {len(lines) - MOST_LINES} more")
 
 
-def _print_early_ends(campaign, results: Path, items) -> None:
+def _print_early_ends(results: Path, items) -> None:
     """Print the contacts whose runs failed or ended early by physics; write all reasons to files in `logs`."""
     from icha.planning.plan import DONE, FAILED, RUNS
-    from icha.planning.results import campaign_files
 
-    cases = campaign_files(campaign).runs
-    kinds = (
+    for state, what, name, colour in (
         (FAILED, "failed", "failed_runs.txt", "red"),
         (DONE, "ended before the last target, as physics decides", "ended_runs.txt", None),
-    )
-    for state, what, name, colour in kinds:
-        reasons = {
-            cases[item.path]: item.reason for item in items if item.part == RUNS and item.state == state and item.reason
-        }
-        if not reasons:
+    ):
+        found = [item for item in items if item.part == RUNS and item.state == state and item.reason]
+        if not found:
             continue
+        reasons = {item.path.removeprefix("runs/").removesuffix(".nc"): item.reason for item in found}
         file = results / "logs" / name
-        file.write_text("".join(f"{case.path}: {reason}\n" for case, reason in reasons.items()), encoding="utf-8")
+        file.write_text("".join(f"{run}: {reason}\n" for run, reason in reasons.items()), encoding="utf-8")
         # One line for all seeds of a contact, with the first reason.
-        contacts: dict = {}
-        for case in reasons:
-            contacts.setdefault(case._replace(seed=0), []).append(case)
-        lines = [
-            f"{first.path}: {reasons[first]} ({format_count(1 + len(rest), 'seed')})"
-            for first, *rest in contacts.values()
-        ]
-        heading = f"{format_count(len(reasons), 'run')} {what}; all reasons: {shorten_path(file)}"
-        _print_lines(heading, lines, colour)
+        contacts: dict[str, list[str]] = {}
+        for run in reasons:
+            contacts.setdefault(re.sub("/seed[0-9]+/", "/", run), []).append(run)
+        lines = [f"{runs[0]}: {reasons[runs[0]]} ({format_count(len(runs), 'seed')})" for runs in contacts.values()]
+        _print_lines(f"{format_count(len(found), 'run')} {what}; all reasons: {shorten_path(file)}", lines, colour)
 
 
 def _print_checks(campaign, results: Path) -> None:
