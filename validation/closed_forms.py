@@ -26,59 +26,14 @@ def intensity_at_equilibrium(material: Material) -> float:
     return math.sqrt(2 * material.contact_modulus * material.surface_energy)
 
 
-@dataclass(frozen=True)
-class RoundPunch:
-    """A single flat punch with a circular face of a radius in m (K. Kendall, J. Phys. D: Appl. Phys. 4 (1971) 1186)."""
+def punch_displacement(material: Material, radius: float, force: float, period: float) -> float:
+    """Return the displacement of a round flat punch in a periodic cell with zero mean displacement, m.
 
-    material: Material
-    radius: float
-
-    @property
-    def pull_off_force(self) -> float:
-        """sqrt(8 pi E* dgamma a^3), N: K = F/(2 sqrt(pi) a^(3/2)) along the edge is that of equilibrium."""
-        E, gamma = self.material.contact_modulus, self.material.surface_energy
-        return math.sqrt(8 * math.pi * E * gamma * self.radius**3)
-
-    def displacement(self, force: float) -> float:
-        """Return F/(2 E* a), m, with the sign of the force."""
-        return force / (2 * self.material.contact_modulus * self.radius)
-
-    def displacement_in_cell(self, force: float, period: float) -> float:
-        """Return the displacement with periodic images and zero mean displacement, m, to third order in a/period.
-
-        Images act by their force and by their second moments. The mean square radius of the pressure is 2 a^2/3.
-        """
-        by_images = IMAGES / period + 2 * IMAGES_CUBED / period**3 * self.radius**2 / 6
-        return self.displacement(force) + force * by_images / (math.pi * self.material.contact_modulus)
-
-
-@dataclass(frozen=True)
-class Strips:
-    """A row of infinitely long flat strips, with half-width a and period L (m).
-
-    Source: W. T. Koiter, Ing.-Arch. 28 (1959) 168, for the row of cracks between them: K^2 = sigma^2 L cot(pi a/L)
-    under the nominal tension sigma.
+    F/(2 E* a), and the displacement by images to third order in a/period: images act by their force and by their second
+    moments. The mean square radius of the pressure is 2 a^2/3.
     """
-
-    material: Material
-    half_width: float
-    period: float
-
-    @property
-    def pull_off_tension(self) -> float:
-        """Nominal tension at equilibrium, sqrt(2 E* dgamma tan(pi a/L)/L), Pa."""
-        return intensity_at_equilibrium(self.material) * math.sqrt(
-            math.tan(math.pi * self.half_width / self.period) / self.period
-        )
-
-    @property
-    def compliance(self) -> float:
-        """Mean gap over the nominal tension, -2 L ln sin(pi a/L)/(pi E*), m/Pa.
-
-        Its derivative by a gives G = K^2/(2 E*) at both edges.
-        """
-        sine = math.sin(math.pi * self.half_width / self.period)
-        return -2 * self.period * math.log(sine) / (math.pi * self.material.contact_modulus)
+    by_images = IMAGES / period + 2 * IMAGES_CUBED / period**3 * radius**2 / 6
+    return force / (2 * material.contact_modulus * radius) + force * by_images / (math.pi * material.contact_modulus)
 
 
 @dataclass(frozen=True)
@@ -86,8 +41,9 @@ class Sinusoid:
     """Contact of a wave h = amplitude cos(2 pi x/L) in m (K. L. Johnson, Int. J. Solids Struct. 32 (1995) 423).
 
     Without adhesion H. M. Westergaard's solution (J. Appl. Mech. 6 (1939) A49), p = p* sin^2(pi a/L) with p* = pi E*
-    amplitude/L; its mean gap follows by integrating du = -compliance of strips dp. Adhesion adds a tension as on
-    `Strips`. Methods take psi = pi a/L between 0 and pi/2, with a half the width of contact, of any shape.
+    amplitude/L; its mean gap follows by integrating du = -compliance of strips dp. Adhesion adds a tension as on flat
+    strips (W. T. Koiter, Ing.-Arch. 28 (1959) 168, for the cracks between them). Methods take psi = pi a/L between 0
+    and pi/2, with a half the width of contact, of any shape.
     """
 
     material: Material

@@ -1,6 +1,6 @@
 """How often the intervals of `icha.fit_jkr_test` contain the truth: table of docs/estimates.md.
 
-    make jkr-test, or python -m validation.jkr_test [--tests N] [--tables]
+    make jkr-test, or python -m validation.jkr_test [--tables]
 
 Each synthetic test has its own lens, modulus, works of adhesion, load and noise. Its equations are written here, apart
 from those of the fit: the force at each contact radius follows from the energy release rate, and states at given forces
@@ -9,18 +9,16 @@ are found by interpolation. With `--tables`, nothing is computed; the table is w
 
 from __future__ import annotations
 
-import argparse
-import json
 import warnings
 from collections.abc import Mapping
-from pathlib import Path
+from functools import partial
 
 import numpy as np
 
 import icha
-from validation.tables import Table, write_tables
+from validation.measurements import Parts, Rows, measure_page, read_rows
+from validation.tables import Table
 
-RESULTS = Path(__file__).resolve().parent / "results/jkr_test.json"
 TESTS, POINTS, NOISE = 200, 50, 0.02
 # Standard deviation of the noise is a share of these values of a column.
 SIZES = {"largest": lambda values: np.abs(values).max(), "range": np.ptp, "each": np.abs}
@@ -85,59 +83,41 @@ def random_truth(rng, loads: tuple[float, float]) -> dict[str, float]:
     return {"radius": radius, "modulus": modulus, "advancing": advancing, "receding": receding, "load": load}
 
 
-def measure(tests: int) -> list[dict]:
-    """Return, for each case, how often each interval contains the truth, and the median width of the intervals."""
-    rows = []
-    for case, (columns, known, size, loads) in CASES.items():
-        inside, widths = {name: [] for name in QUANTITIES}, {name: [] for name in QUANTITIES}
-        rng = np.random.default_rng(1)
-        for _ in range(tests):
-            truth = random_truth(rng, loads)
-            exact = exact_test(**truth)
-            offset = 0.0 if known else 0.3 * float(exact["indentation"].max())
-            table = noisy_test(exact, rng, columns, offset, size)
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", icha.IchaWarning)
-                test = icha.fit_jkr_test(table, truth["radius"], indentation_offset=0.0 if known else None)
-            true = {"contact_modulus": truth["modulus"]}
-            true |= {"advancing_work": truth["advancing"], "receding_work": truth["receding"]}
-            for name, value in true.items():
-                if (found := getattr(test, name)) is not None:
-                    inside[name].append(found.low <= value <= found.high)
-                    widths[name].append((found.high - found.low) / value)
-        counts = {name: [int(np.sum(each)), len(each)] for name, each in inside.items()}
-        rows.append(
-            {"case": case, "counts": counts, "width": {n: float(np.median(each)) for n, each in widths.items()}}
-        )
-        print(rows[-1], flush=True)
-    return rows
+def count_coverage(case: str) -> dict:
+    """Return how often each interval of a case contains the truth, and the median width of the intervals."""
+    columns, known, size, loads = CASES[case]
+    inside, widths = {name: [] for name in QUANTITIES}, {name: [] for name in QUANTITIES}
+    rng = np.random.default_rng(1)
+    for _ in range(TESTS):
+        truth = random_truth(rng, loads)
+        exact = exact_test(**truth)
+        offset = 0.0 if known else 0.3 * float(exact["indentation"].max())
+        table = noisy_test(exact, rng, columns, offset, size)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", icha.IchaWarning)
+            test = icha.fit_jkr_test(table, truth["radius"], indentation_offset=0.0 if known else None)
+        for name, value in zip(QUANTITIES, (truth[key] for key in ("modulus", "advancing", "receding")), strict=True):
+            if (found := getattr(test, name)) is not None:
+                inside[name].append(found.low <= value <= found.high)
+                widths[name].append((found.high - found.low) / value)
+    counts = {name: [int(np.sum(each)), len(each)] for name, each in inside.items()}
+    return {"case": case, "counts": counts, "width": {n: float(np.median(each)) for n, each in widths.items()}}
 
 
-def tables(rows: list[dict]) -> dict[str, Table]:
+PARTS: Parts = {"coverage": (count_coverage, [(case,) for case in CASES])}
+
+
+def tables(rows: Rows) -> dict[str, Table]:
     """Return the table of the page."""
     head = ["measured beside the force", *QUANTITIES.values(), *(f"width, {each}" for each in QUANTITIES.values())]
     lines = []
-    for row in rows:
+    for row in rows["coverage"]:
         shares = [f"{100 * inside / count:.0f} % of {count}" for inside, count in row["counts"].values()]
         lines.append([row["case"], *shares, *(f"{100 * width:.0f} %" for width in row["width"].values())])
     return {"jkr_test_coverage": Table(head, lines, numbers=True)}
 
 
-def read_measurements() -> list[dict]:
-    """Return the saved counts."""
-    return json.loads(RESULTS.read_text(encoding="utf-8"))
-
-
-def main() -> None:
-    """Measure, save and write the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--tests", type=int, default=TESTS, help="number of synthetic tests in each case")
-    parser.add_argument("--tables", action="store_true", help="write the table from the saved counts")
-    options = parser.parse_args()
-    if not options.tables:
-        RESULTS.write_text(json.dumps(measure(options.tests), indent=1) + "\n", encoding="utf-8")
-    write_tables(tables(read_measurements()))
-
+read_measurements = partial(read_rows, "jkr_test", PARTS)
 
 if __name__ == "__main__":
-    main()
+    measure_page("jkr_test", PARTS, tables, __doc__)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from threadpoolctl import threadpool_limits
@@ -16,14 +16,6 @@ RESULTS = Path(__file__).resolve().parent / "results"
 Rows = dict[str, list[dict]]
 # For each part of a page: a function that returns a row or several rows, and its arguments, call by call.
 Parts = Mapping[str, tuple[Callable, Sequence[tuple]]]
-
-
-def measure(solve: Callable, arguments: Iterable[tuple]) -> Iterator[dict]:
-    """Yield the rows of a part."""
-    with threadpool_limits(1):
-        for each in arguments:
-            found = solve(*each)
-            yield from [found] if isinstance(found, dict) else found
 
 
 def read_rows(page: str, parts: Iterable[str]) -> Rows:
@@ -40,9 +32,12 @@ def measure_page(page: str, parts: Parts, tables: Callable[[Rows], dict[str, Tab
     for part in () if options.tables else options.parts:
         print(f"{part} ...", end=" ", flush=True)
         clock = time.perf_counter()
-        rows = list(measure(*parts[part]))
-        found = {"seconds": round(time.perf_counter() - clock, 1), "rows": rows}
-        text = json.dumps(found, indent=1, default=lambda number: number.item())
+        solve, arguments = parts[part]
+        with threadpool_limits(1):
+            found = [solve(*each) for each in arguments]
+            rows = [row for each in found for row in ([each] if isinstance(each, dict) else each)]
+        seconds = round(time.perf_counter() - clock, 1)
+        text = json.dumps({"seconds": seconds, "rows": rows}, indent=1, default=lambda number: number.item())
         (RESULTS / page / f"{part}.json").write_text(text + "\n", encoding="utf-8")
-        print(f"{len(rows)} rows in {found['seconds']:.0f} s", flush=True)
+        print(f"{len(rows)} rows in {seconds:.0f} s", flush=True)
     write_tables(tables(read_rows(page, parts)))

@@ -9,7 +9,6 @@ import tempfile
 import time
 import warnings
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path as File
 
 import numpy as np
@@ -21,23 +20,12 @@ from icha.boundary_elements.elastic import wave_numbers
 from icha.half_space.layer import Layer, layer_compliance
 from icha.references.indentation import sphere_contact, sphere_pull_off
 from icha.surfaces.shapes import Paraboloid
-from validation.indenter_contacts import ADHESIVE, BARE, PULL_OFF
+from validation.indenter_contacts import ADHESIVE, BARE, PULL_OFF, Shifted
 from validation.surfaces import paraboloid
 
 ROOT = File(__file__).resolve().parents[1]
 # ContactMechanics is installed there by `make .venv-benchmarks/.installed`.
 OTHER_PYTHON = ROOT / ".venv-benchmarks/bin/python"
-
-
-@dataclass(frozen=True)
-class ShiftedParaboloid(Paraboloid):
-    """Paraboloid whose apex is shifted by `shift` along x and y, m."""
-
-    shift: float = 0.0
-
-    def heights(self, x, y):
-        """Return the heights of the shifted paraboloid."""
-        return super().heights(x - self.shift, y - self.shift)
 
 
 def rough_sphere(
@@ -56,7 +44,7 @@ def rough_sphere(
     fine = coarse.refined(refinement).heights * math.sqrt(energy / coarse.full_contact_energy)
     # Distance of the apex from the first node: (n/2 + 0.29 - 0.5) cells of the coarse grid.
     shift = -0.21 * coarse.spacing * (1 - 1 / refinement)
-    return Surface(fine, side, "free", ShiftedParaboloid((1.0, 1.0), shift))
+    return Surface(fine, side, "free", Shifted(Paraboloid((1.0, 1.0)), (shift, shift)))
 
 
 def follow(surface: Surface, material: Material, indentation: float) -> xr.Dataset:

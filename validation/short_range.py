@@ -39,7 +39,6 @@ PARTS: Parts = {
         single.flat_punch,
         [(*size, square) for square in (False, True) for size in ((64, 8), (96, 12), (128, 16))],
     ),
-    "strips": (single.row_of_strips, [(64, 0.2), (96, 0.2)]),
     "sinusoid": (single.sinusoid, [*product((32, 64, 128), (0.1, 0.3))]),
     "crack": (single.crack, [(48,), (64,), (96,), (128,)]),
     "pair": (single.pair, [(96,), (128,)]),
@@ -173,7 +172,6 @@ _BY_ROW = {
         spots_before: spots before g; spots_after: after g; area_error: area %; force_error: force %""",
     "punches": """square: square (1) or round (0) g; cells: radius in cells g; pull_off: pull-off .4g;
         pull_off_of_nodes: pull-off by nodes .4g; compliance: compliance .4g""",
-    "strips": "grid: grid g; cells: half-width in cells g; pull_off_error: pull-off %; compliance_error: compliance %",
     "wave sinusoid": """alpha: α g; grid: grid g; psi: ψ g; cells: half-width in cells .3g; width_error: width %;
         pressure: p/p\\* .4g; pressure_exact: exact .4g; pressure_error: pressure %; energy_error: energy %""",
     "crack": """grid: grid g; radius: c/L g; cells: radius in cells .3g; radius_error: radius %;

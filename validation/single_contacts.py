@@ -14,9 +14,10 @@ from icha.asperity.material import Material
 from icha.boundary_elements.contact import BoundaryElements, contact_of
 from icha.contact.model import PRESSURE, Control, FullContact
 from icha.equilibrium.interacting_asperities import InteractingAsperities
+from icha.references.indentation import punch_pull_off
 from icha.surfaces.summits import find_summits
-from validation.closed_forms import CrackInTrough, RoundPunch, Sinusoid, SphereInCell, Strips
-from validation.surfaces import bump, punch, strips, two_bumps, wave
+from validation.closed_forms import CrackInTrough, Sinusoid, SphereInCell, punch_displacement
+from validation.surfaces import bump, punch, two_bumps, wave
 
 # Tabor parameter 5: the range affects only the jump into contact.
 MATERIAL = Material(1.0, 1.0, 0.2)
@@ -161,14 +162,6 @@ def ellipse(grid: int, angle: float, approaches: Sequence[float] = (2.0, 1.0, 0.
     return [row | {"pull_off": tension, "spacing": surface.spacing} for row in rows]
 
 
-def _pull(surface, face, let_go):
-    """Return compliance (m/N) and pull-off (N) of a flat face; `let_go` is the displacement at pull-off, m."""
-    contact = contact_of(surface, MATERIAL)
-    state = contact.relax_region(face, float(surface.heights.max()) + 0.02 * let_go)
-    compliance = 0.02 * let_go / -force_and_area(contact, state)[0]
-    return compliance, largest_tension(contact, state, 0.1 * let_go)[0]
-
-
 def flat_punch(grid: int, cells: float, square: bool = False) -> dict:
     """Pull-off of a flat punch with a radius, or half side, in cells, and the compliance of its unbroken contact.
 
@@ -176,33 +169,21 @@ def flat_punch(grid: int, cells: float, square: bool = False) -> dict:
     """
     spacing = _PERIOD / grid
     radius = cells * spacing
-    round_ = RoundPunch(MATERIAL, radius)
-    let_go = round_.displacement_in_cell(round_.pull_off_force, _PERIOD)
+    pull_off = -float(punch_pull_off(radius, 1.0, 1.0).force)
+    let_go = punch_displacement(MATERIAL, radius, pull_off, _PERIOD)
     surface, face = punch(grid, _PERIOD, radius, 10 * let_go, square)
-    compliance, tension = _pull(surface, face, let_go)
+    contact = contact_of(surface, MATERIAL)
+    state = contact.relax_region(face, float(surface.heights.max()) + 0.02 * let_go)
+    compliance = 0.02 * let_go / -force_and_area(contact, state)[0]
+    tension, _ = largest_tension(contact, state, 0.1 * let_go)
     nodes = math.sqrt(np.count_nonzero(face) / math.pi) * spacing
     return {
         "grid": grid,
         "cells": cells,
         "square": square,
-        "pull_off": tension / round_.pull_off_force,
-        "pull_off_of_nodes": tension / RoundPunch(MATERIAL, nodes).pull_off_force,
-        "compliance": compliance / round_.displacement_in_cell(1.0, _PERIOD),
-    }
-
-
-def row_of_strips(grid: int, half_width: float) -> dict:
-    """Pull-off of strips of a half-width (in periods) against Koiter's, and their compliance."""
-    cells = round(half_width * grid)
-    exact = Strips(MATERIAL, cells / grid * _PERIOD, _PERIOD)
-    let_go = exact.pull_off_tension * exact.compliance
-    surface, face = strips(grid, _PERIOD, exact.half_width, 10 * let_go)
-    compliance, tension = _pull(surface, face, let_go)
-    return {
-        "grid": grid,
-        "cells": cells,
-        "pull_off_error": tension / _PERIOD**2 / exact.pull_off_tension - 1,
-        "compliance_error": compliance * _PERIOD**2 / exact.compliance - 1,
+        "pull_off": tension / pull_off,
+        "pull_off_of_nodes": tension / -float(punch_pull_off(nodes, 1.0, 1.0).force),
+        "compliance": compliance / punch_displacement(MATERIAL, radius, 1.0, _PERIOD),
     }
 
 

@@ -4,8 +4,8 @@ import numpy as np
 
 from icha.surfaces.surface import Surface
 
-# Flat faces need a summit without effect on the contact: punches are domes of this height over their radius, and faces
-# that are infinite along y have a wave of the second fraction of their height.
+# Flat faces need a summit without effect on the contact: punches are domes of this height over their radius, and waves
+# that are infinite along y have a wave along y of the second fraction of their height.
 _DOME = 1e-9
 _ALONG = 2e-5
 
@@ -58,14 +58,6 @@ def punch(grid: int, period: float, radius: float, depth: float, square: bool = 
     face = (np.maximum(np.abs(x), np.abs(y)) if square else np.hypot(x, y)) < radius
     dome = _DOME * (radius**2 - x**2 - y**2) / radius
     return Surface(np.where(face, dome, -depth), period), face
-
-
-def strips(grid: int, period: float, half_width: float, depth: float) -> tuple[Surface, np.ndarray]:
-    """Return a flat strip along y, one per period, and its face, (n, n) of bool."""
-    y, x = _from_centre(grid, period / grid, (grid / 2 - 0.5, grid // 2))
-    face = np.broadcast_to(np.abs(x) < half_width, (grid, grid))
-    along = _ALONG * depth * np.cos(2 * np.pi * y / period)
-    return Surface(np.where(face, 0.0, -depth) + along - _DOME * x**2 / half_width, period), face
 
 
 def wave(grid: int, period: float, amplitude: float, dimensions: int = 1) -> Surface:
