@@ -27,7 +27,7 @@ class StepAccuracy:
     contact : contact model.
     longest : longest step of the separation, m.
     work : sum of the absolute values of work and loss of all steps so far, J/m^2.
-    released : sum of the absolute losses of all steps with events that may change the pressure, J/m^2.
+    released : sum of `Step.released` of all steps so far, J/m^2.
     lowest_pressure : lowest nominal pressure so far, Pa; zero if the pressure was never negative.
     """
 
@@ -46,8 +46,8 @@ class StepAccuracy:
     def allowed_error(self, step: Step) -> float:
         """Return the largest allowed error of the work of a step, J/m^2.
 
-        It is `path_accuracy.work` times the work and losses of the path including this step. With events that may
-        change the pressure, it is at least ERROR_OVER_RELEASED times the energy that events have released.
+        It is the larger of ERROR_OVER_RELEASED times the energy that jumps of spots have released, and
+        `path_accuracy.work` times the work and losses, both of the path including this step.
         """
         accuracy = self.contact.path_accuracy
         relative = accuracy.work if self.contact.adhesive else accuracy.reversible_work
@@ -74,11 +74,14 @@ class StepAccuracy:
         the last contact breaks in the step.
         """
         contact, du = self.contact, step.separation_change
-        slope, end_slope = (-contact.stiffness(each) for each in (start, state))
-        if du < 0 or not np.isfinite(slope + end_slope):
+        if du < 0:
             return True
         if contact.adhesive and contact.spot_count(start) and not contact.spot_count(state):
             return False  # This event must be located as exactly as possible.
+        slope, end_slope = (-contact.stiffness(each) for each in (start, state))
+        # Full contact is infinitely stiff. Its tension is largest when the first gap opens, in a state of the path.
+        if not np.isfinite(slope + end_slope):
+            return True
         p, slope = contact.pressure(start), slope if step.may_change_pressure else 0.5 * (slope + end_slope)
         lowest, known = min(p, p + du * slope), min(p, contact.pressure(state))
         return lowest >= self.lowest_pressure or known - lowest <= _MISSED_TENSION * abs(lowest)
