@@ -22,7 +22,6 @@ _SAME_LOAD = 1e-6
 
 _WITHOUT_SEED = tuple(label for label in LABELS if label != "seed")
 _SEED_COUNT = Variable(_WITHOUT_SEED, "1", "number of seeds in the mean and the standard deviation", np.int32)
-_ASKED_SEED_COUNT = Variable(_WITHOUT_SEED, "1", "number of requested seeds", np.int32)
 _AVERAGED = (
     ("contact_area_fraction", "area", "A/A0"),
     ("reduced_separation", "separation", "mean separation (of a free square: mean gap) divided by rms height"),
@@ -80,14 +79,13 @@ def compare_runs(study: xr.Dataset) -> xr.Dataset:
 
     - `contact_area_fraction` and `reduced_separation` along the labels of the runs;
     - the mean of both variables over the seeds, the standard deviation, and half the width of the 95 % confidence
-      interval (`area_mean`, `area_deviation`, `area_confidence`, `separation_mean`, …; `icha.uncertainty.ensembles`);
-    - `material_spread` and `slope_spread`: largest area of all materials or slopes divided by the smallest, minus 1.
+      interval (`area_mean`, `area_deviation`, `area_confidence`, `separation_mean`, …; `icha.uncertainty.ensembles`).
 
     Incomplete runs (`status`) have no values and do not contribute to means. Runs that left the range of the model have
     values up to the limit of the model. Runs for which the asperity model is not applicable have values, but do not
-    contribute to means. `seed_count` is the number of seeds in the means, `asked_seed_count` the number of requested
-    seeds. For a single seed, standard deviation and confidence interval are missing. The confidence interval is also
-    missing if more than a tenth of the requested seeds is (`icha.uncertainty.left_out`).
+    contribute to means. `seed_count` is the number of seeds in the means. For a single seed, standard deviation and
+    confidence interval are missing. The confidence interval is also missing if more than a tenth of the requested seeds
+    is (`icha.uncertainty.left_out`).
     """
     status = study["status"].transpose(*LABELS).values
     loaded, asked = np.isin(status, LOADED_RUNS), np.isin(status, (*COMPUTED_RUNS, MISSING))
@@ -98,7 +96,6 @@ def compare_runs(study: xr.Dataset) -> xr.Dataset:
     variables = {
         "status": study["status"],
         "seed_count": make_variable(_SEED_COUNT, averaged.sum(axis=seeds)),
-        "asked_seed_count": make_variable(_ASKED_SEED_COUNT, asked.sum(axis=seeds)),
     }
     coords = {label: study[label] for label in LABELS}
     for axis, load in _loads(study).items():
@@ -106,7 +103,7 @@ def compare_runs(study: xr.Dataset) -> xr.Dataset:
         at, on_grid = _on_common_grid(study, load, loaded)
         coords[axis] = make_variable(TERMS[axis]._replace(dims=(axis,)), at)
         curves = {name: (Variable(LABELS, "1", study[name].attrs["long_name"]), on_grid[name]) for name in on_grid}
-        for name, (description, values) in (curves | _spreads(on_grid, averaged, asked)).items():
+        for name, (description, values) in (curves | _statistics(on_grid, averaged, asked)).items():
             along = description._replace(
                 dims=(*description.dims, axis), long_name=f"{description.long_name}, at fixed {TERMS[axis].long_name}"
             )
@@ -150,8 +147,8 @@ def _on_common_grid(study, load, loaded):
     return at, on_grid
 
 
-def _spreads(on_grid, averaged, asked):
-    """Return descriptions and values of statistics over the seeds, and of ratios between materials or slopes."""
+def _statistics(on_grid, averaged, asked):
+    """Return descriptions and values of statistics over the seeds, by variable name."""
     found, seeds = {}, LABELS.index("seed")
     stated = ~too_few(averaged.sum(axis=seeds), asked.sum(axis=seeds))[..., None]
     for name, short, symbol in _AVERAGED:
@@ -162,15 +159,6 @@ def _spreads(on_grid, averaged, asked):
             missing += ", or too few of the requested seeds" if part == "confidence" else ""
             description = Variable(_WITHOUT_SEED, "1", words.format(symbol), further={"missing": missing})
             found[f"{short}_{part}"] = description, getattr(over_seeds, part)
-    for label, many in (("material", "materials"), ("rms_slope", "rms slopes")):
-        description = Variable(
-            tuple(each for each in LABELS if each != label),
-            "1",
-            f"largest A/A0 of all {many} divided by the smallest, minus 1",
-        )
-        area, axis = on_grid["contact_area_fraction"], LABELS.index(label)
-        spread = np.fmax.reduce(area, axis) / np.fmin.reduce(area, axis) - 1
-        found[f"{label.removeprefix('rms_')}_spread"] = description, spread
     return found
 
 

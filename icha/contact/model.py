@@ -216,7 +216,6 @@ class Observables(Protocol):
 # have equal width from -1 to 5, and there are 20 bins per decade in the tails, up to 500 in magnitude. The first bin
 # includes all lower pressures: at the edge of a JKR spot the pressure is minus infinity, and the density falls as
 # |p|^-3.
-GAPS_PER_DECADE = 20
 GAP_BINS = np.concatenate([[0.0], np.logspace(-4, 1.5, 111)])
 PRESSURE_BINS = np.concatenate([-np.logspace(2.7, 0, 55)[:-1], np.linspace(-1, 5, 301), 5 * np.logspace(0, 2, 41)[1:]])
 

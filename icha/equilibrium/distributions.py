@@ -3,7 +3,7 @@
 import numpy as np
 
 from icha.asperity.jkr import JKR
-from icha.contact.model import GAPS_PER_DECADE, PRESSURE_BINS, gap_bins
+from icha.contact.model import PRESSURE_BINS, gap_bins
 from icha.equilibrium.sites import ContactState, Spots
 from icha.half_space.grid_displacement import DisplacementField, row_blocks, windows
 from icha.support.parallel import on_cores
@@ -75,8 +75,8 @@ def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> dict:
         u = w + (state.separation - surface.profile[rows])
         cover, inside = _cover_rows(period, grid, spots.position, a, rows, free_square)
         u[inside] = 0.0
-        # Bin 0 contains the negative gaps.
-        index = np.where(u < 0, 0, _gap_bin(u, edges) + 1).ravel()
+        # Bin 0 contains the negative gaps, and the last bin all gaps beyond its upper edge.
+        index = np.minimum(np.searchsorted(edges, u.ravel(), side="right"), len(edges) - 1)
         touched = np.flatnonzero(cover)
         covered = np.bincount(index[touched], weights=np.clip(cover.ravel()[touched], 0.0, 1.0), minlength=len(edges))
         return np.bincount(index, minlength=len(edges)) - covered, np.sum(cover), np.sum(np.maximum(cover - 1.0, 0.0))
@@ -89,17 +89,6 @@ def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> dict:
         excess_area += max(float(area - sum(covered) / grid**2), 0.0)
     density = content[1:] / np.diff(edges)
     return {"gap_density": density, "overlap_fraction": float(content[0]), "area_beyond_edges": excess_area}
-
-
-def _gap_bin(u, edges):
-    """Return the bin of every gap u for `edges` from `gap_bins`; bin 0 if u < 0, the last bin if u > edges[-1]."""
-    last = len(edges) - 2
-    decade = np.log10(np.maximum(u / edges[1], 1.0))
-    index = np.minimum(decade * GAPS_PER_DECADE + 1, last).astype(np.intp)
-    # Close to an edge of a bin, rounding of the logarithm may give the neighbouring bin.
-    index -= u < edges[index]
-    index += (u >= edges[index + 1]) & (index < last)
-    return index
 
 
 def pressure_distribution(law: JKR, surface: Surface, spots: Spots) -> dict:

@@ -74,25 +74,6 @@ def _with_adhesion(a, indentation, force, contact_modulus, work_of_adhesion):
     return ContactState(a, indentation - lift, force - 2 * contact_modulus * a * lift)
 
 
-def stable_branches(states: ContactState, control: str = "indentation") -> tuple[np.ndarray, np.ndarray]:
-    """Return the masks of the states that loading and unloading pass through, for radii in ascending order.
-
-    Between the states of a branch, the contact jumps. Loading starts at the first touch of the apex, at force 0 and
-    indentation 0. The contact remains one circle.
-
-    Parameters
-    ----------
-    states : equilibria at contact radii that increase from nearly 0.
-    control : "indentation" or "force", the quantity that the experiment prescribes.
-    """
-    if control not in ("indentation", "force"):
-        raise ValueError(f"control: {control!r} must be one of indentation, force")
-    prescribed = np.asarray(getattr(states, control))
-    largest = np.maximum.accumulate(np.concatenate([[0.0], prescribed[:-1]]))
-    smallest = np.minimum.accumulate(np.concatenate([[np.inf], prescribed[:0:-1]]))[::-1]
-    return prescribed > largest, prescribed < smallest
-
-
 def sphere_contact(contact_radius, radius, contact_modulus, work_of_adhesion=0.0) -> ContactState:
     """Return the equilibria of a paraboloid of the given radius R by Johnson, Kendall & Roberts (1971).
 

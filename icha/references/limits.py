@@ -21,10 +21,10 @@ from icha.path.targets import (
     REDUCED_PRESSURE,
     Path,
 )
-from icha.references.indentation import axisymmetric_contact, pull_off_state, sphere_contact, stable_branches
+from icha.references.indentation import contact_radius_at, pull_off_state
 from icha.support.formatting import format_quantity
 from icha.surfaces.resolution import LEAST_CELLS, RADIUS, Resolution, resolution_of
-from icha.surfaces.shapes import Paraboloid, Shape
+from icha.surfaces.shapes import Shape
 from icha.surfaces.surface import FREE, Surface
 
 # Cells in the contact radius of a sphere or cone at pull-off, below which the force is 10 to 30 %, or 6 %, too small.
@@ -32,15 +32,12 @@ _POOR_CELLS, _FAIR_CELLS = 2.0, 3.0
 # Cells by which the edge of a punch is too small; cells in its radius from which this describes the error; and the
 # largest error, in per cent, that is not mentioned.
 _LOST_CELLS, _LEAST_EDGE, _SMALL_ERROR = 1.35, 6.0, 5.0
-# Contact radii at which states of a shape are computed, divided by half the side of the square.
-_RADII = np.geomspace(1e-5, math.sqrt(2), 4000)
 
 
 def radius_at_target(shape: Shape, side: float, material: Material, kind: str, value: float) -> float:
     """Return the contact radius of a smooth shape on a half-space at a target of the first loading, m.
 
-    A layer counts as a half-space. A paraboloid of two radii counts as a sphere of the same mean radius. The result is
-    0 if there is no contact yet.
+    A layer counts as a half-space, and a shape as in `contact_radius_at`. The result is 0 if there is no contact yet.
 
     Parameters
     ----------
@@ -50,19 +47,10 @@ def radius_at_target(shape: Shape, side: float, material: Material, kind: str, v
     quantity, prescribed = convert_target(shape, side, material.contact_modulus, kind, value)
     if quantity == CONTACT_RADIUS:
         return prescribed
-    if (end := shape.end_radius) is not None:
-        return end
-    radii = _RADII * side / 2
-    if isinstance(shape, Paraboloid):
-        states = sphere_contact(radii, shape.sphere_radius, material.contact_modulus, material.surface_energy)
-    else:
-        radii = radii[radii < getattr(shape, "radius", math.inf)]
-        states = axisymmetric_contact(radii, shape.slope, material.contact_modulus, material.surface_energy)
-    loading, _ = stable_branches(states, quantity)
-    given = np.asarray(getattr(states, quantity))[loading]
-    if not len(given):  # adhesion pulls the whole square into contact
-        return float(radii[-1])
-    return float(np.interp(prescribed, given, radii[loading], left=0.0))
+    if prescribed <= 0 and shape.end_radius is None:
+        return 0.0
+    radius = contact_radius_at(quantity, prescribed, shape, material.contact_modulus, material.surface_energy)
+    return min(radius, side / math.sqrt(2))
 
 
 def convert_target(shape: Shape, side: float, contact_modulus: float, kind: str, value: float) -> tuple[str, float]:

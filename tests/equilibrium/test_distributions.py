@@ -11,8 +11,8 @@ from half_space import periodic_displacement
 
 from icha import Material, SelfAffineSpectrum, Surface
 from icha.asperity.jkr import JKR
-from icha.contact.model import GAP_BINS, PRESSURE_BINS, gap_bins
-from icha.equilibrium.distributions import _gap_bin, gap_distribution, pressure_distribution
+from icha.contact.model import PRESSURE_BINS, gap_bins
+from icha.equilibrium.distributions import gap_distribution, pressure_distribution
 from icha.equilibrium.interacting_asperities import contact_of
 from icha.equilibrium.sites import Spots
 from icha.half_space.grid_displacement import row_blocks
@@ -109,17 +109,6 @@ def test_gap_distribution_of_many_spots_from_their_fields(rough):
     assert gaps["overlap_fraction"] == pytest.approx(np.sum(outside[u < 0]), rel=1e-9)
     area = np.sum(np.pi * state.spots.contact_radius**2) / PERIOD**2
     assert np.sum(expected) + gaps["overlap_fraction"] + area == pytest.approx(1, abs=1e-12)
-
-
-def test_gaps_on_the_edges_of_bins_are_counted_in_the_bin_above():
-    # On every edge and at the numbers next to it.
-    edges = GAP_BINS[1:-1]
-    wanted = np.concatenate([edges, np.nextafter(edges, 0), np.nextafter(edges, np.inf), [0.0] * 3, [GAP_BINS[-1]] * 2])
-    n = 20
-    u = np.resize(wanted, n * n)
-    index = _gap_bin(u.reshape(n, n) * 0.7, GAP_BINS * 0.7).ravel()
-    expected = np.minimum(np.searchsorted(GAP_BINS * 0.7, u * 0.7, side="right") - 1, len(GAP_BINS) - 2)
-    np.testing.assert_array_equal(index, expected)
 
 
 def test_gap_distribution_around_one_hertz_spot():

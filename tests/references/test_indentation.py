@@ -138,19 +138,3 @@ def test_flat_punch_has_the_stiffness_and_pull_off_force_of_boussinesq_and_kenda
     # Stored energy F^2/(4 a E*) changes by the energy of adhesion: d/da of it at fixed depth, E* delta^2.
     assert MODULUS * end.indentation**2 == pytest.approx(2 * math.pi * 1e-5 * WORK, rel=1e-13)
     assert closed.punch_force(end.indentation, 1e-5, MODULUS) == pytest.approx(end.force, rel=1e-13)
-
-
-def test_loading_of_a_sphere_starts_with_a_jump_and_unloading_ends_at_the_smallest_value():
-    a = np.linspace(1e-8, 3e-4, 30001)
-    states = closed.sphere_contact(a, RADIUS, MODULUS, WORK)
-    touch = {
-        "indentation": 2 * math.pi * WORK * RADIUS**2 / MODULUS,
-        "force": 4.5 * math.pi * WORK * RADIUS**2 / MODULUS,
-    }
-    ends = {"indentation": closed.sphere_jump_off, "force": closed.sphere_pull_off}
-    for control, cubed_radius in touch.items():
-        loading, unloading = closed.stable_branches(states, control)
-        assert a[loading][0] == pytest.approx(cubed_radius ** (1 / 3), abs=2e-8)
-        assert a[unloading][0] == pytest.approx(float(ends[control](RADIUS, MODULUS, WORK).contact_radius), abs=2e-8)
-        assert np.all(np.diff(np.flatnonzero(loading)) == 1) and np.all(np.diff(np.flatnonzero(unloading)) == 1)
-        assert loading[-1] and unloading[-1]
