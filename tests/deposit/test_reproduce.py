@@ -220,7 +220,7 @@ def test_nothing_in_a_deposit_is_executed(deposit, reproduce, tmp_path, monkeypa
     """For real, wherever the command is called: neither the source, nor what lies beside configuration and inputs."""
     mark = LEAVES_A_MARK.format(mark=str(tmp_path / "mark"))
     names = ("Snakefile", "icha/__init__.py", "sitecustomize.py", "workflow/rules/runs.smk", "workflow/scripts/job.py")
-    names += ("workflow/scripts/run_batch.py", "numpy.py")
+    names += ("workflow/scripts/compute_batch.py", "numpy.py")
     places = [f"{folder}{name}" for folder in ("source/", "inputs/", "") for name in names]
     packed = deposit(**dict.fromkeys(places, mark))
     monkeypatch.chdir(packed / "source")

@@ -107,11 +107,6 @@ def as_outputs(paths):
     return [MADE.get(path, path) for path in paths]
 
 
-def register(rule):
-    """Note the outputs of the rule of a batch for `as_outputs`."""
-    MADE.update((str(path), path) for path in getattr(rules, rule).output)
-
-
 def as_it_is(value):
     """Return a value as a parameter of a rule, so that Snakemake does not read braces in texts as wildcards."""
     return lambda wildcards: value

@@ -1,36 +1,69 @@
-# Runs. One job computes a batch of short runs or one long run. A failed run does not fail its batch.
+# Surfaces at rms slope 1 (shared by all slopes and materials), theories, and runs: one rule for each batch. With
+# `update`, a batch keeps the files that exist with the expected stamps. A failed run does not fail its batch.
 
-from icha.planning.requirements import run_memory, run_minutes, run_threads
+from itertools import chain
 
-for batch in run_batches(CAMPAIGN, FILES.runs):
-    cases = {FILES.runs[path]._replace(seed=0) for path in batch.files}
+from icha.planning.requirements import run_memory, run_minutes, run_threads, surface_memory, surface_threads
+
+
+def surface_rules():
+    """Yield name of the rule, folder, batch, inputs, function for arguments, cores, memory and time limit."""
+    for batch in surface_batches(CAMPAIGN, FILES.surfaces):
+        names = dict.fromkeys(FILES.surfaces[path][0] for path in batch.files)
+        # Files of the user are compared by content, not by time, because the stamp contains their checksums.
+        files = ancient([CAMPAIGN.surfaces[name].path for name in names if CAMPAIGN.surfaces[name].from_file])
+        needs = [max(need(CAMPAIGN, name) for name in names) for need in (surface_threads, surface_memory)]
+        yield f"make_{batch.name}", "surfaces", batch, files, surface_arguments, *needs, 30
+
+
+def theory_rules():
+    """Yield the same for batches of theories."""
+    for batch in theory_batches(FILES.theories):
+        surfaces = surfaces_for({path: FIRST_SURFACES[FILES.theories[path]] for path in batch.files})
+        yield f"compute_{batch.name}", "references", batch, surfaces, theory_arguments, 1, 600, 10
+
+
+def run_rules():
+    """Yield the same for batches of runs."""
+    for batch in run_batches(CAMPAIGN, FILES.runs):
+        cases = {FILES.runs[path]._replace(seed=0) for path in batch.files}
+        surfaces = surfaces_for({path: surface_of(FILES.runs[path]) for path in batch.files})
+        needs = [max(need(CAMPAIGN, case) for case in cases) for need in (run_threads, run_memory, run_minutes)]
+        yield f"run_{batch.name}", "runs", batch, surfaces, run_arguments, *needs
+
+
+for name, folder, batch, inputs, arguments, cores, memory, minutes in chain(
+    surface_rules(), theory_rules(), run_rules()
+):
 
     rule:
         name:
-            f"run_{batch.name}"
+            name
         input:
-            surfaces_for({path: surface_of(FILES.runs[path]) for path in batch.files}),
+            inputs,
         output:
             [update(path) for path in batch.files],
         log:
-            f"<logs>/runs/{batch.name}.log",
+            f"<logs>/{folder}/{batch.name}.log",
         benchmark:
-            f"<benchmarks>/runs/{batch.name}.jsonl"
-        # Long batches start first; otherwise, at the end, one long run could occupy one core while others are idle.
-        priority: int(batch.seconds)
+            f"<benchmarks>/{folder}/{batch.name}.jsonl"
+        # Long batches of runs start first; otherwise, at the end, one long run could occupy one core while others are
+        # idle.
+        priority: int(batch.seconds) if folder == "runs" else 0
         conda:
             "../envs/icha.yaml"
-        threads: max(run_threads(CAMPAIGN, case) for case in cases)
+        threads: cores
         resources:
-            mem_mb=max(run_memory(CAMPAIGN, case) for case in cases),
-            runtime=max(run_minutes(CAMPAIGN, case) for case in cases),
+            mem_mb=memory,
+            runtime=minutes,
         params:
-            files=as_it_is(LongList(map(run_arguments, batch.files))),
+            files=as_it_is(LongList(map(arguments, batch.files))),
+            kind=folder,
             label=batch.name,
             number=len(batch.files),
         message:
-            "Runs {params.label}, {params.number} runs"
+            "Batch {params.label}, {params.number} files"
         script:
-            "../scripts/run_batch.py"
+            "../scripts/compute_batch.py"
 
-    register(f"run_{batch.name}")
+    MADE.update((str(path), path) for path in getattr(rules, name).output)
