@@ -160,7 +160,7 @@ override DEPOSIT := $(value DEPOSIT)
 export DEPOSIT
 
 validate: validators-environment
-	@.venv-validators/bin/python tests/validators/validate.py $(OPTIONS) -- "$${DEPOSIT:?expected DEPOSIT=FOLDER_OR_ZIP}"
+	@.venv-validators/bin/python tests/validators/validate.py "$${DEPOSIT:?expected DEPOSIT=FOLDER_OR_ZIP}"
 
 clean:
 	rm -rf .snakemake docs/_build

@@ -16,14 +16,6 @@ REPOSITORY = Path(__file__).parents[1]
 PYTHON = REPOSITORY / ".venv-validators/bin/python"
 
 
-def python_of_validators():
-    """Python of their environment; without it the test that asks is skipped or fails."""
-    if not PYTHON.exists():
-        reason = "the validators are not installed: make validators-environment"
-        (pytest.fail if os.environ.get("ICHA_REQUIRE_VALIDATORS") == "1" else pytest.skip)(reason)
-    return PYTHON
-
-
 def sealed(folder):
     """A folder with the checksums of all its files, as a deposit has them."""
     sums = folder / "SHA256SUMS"
@@ -34,10 +26,10 @@ def sealed(folder):
     return folder
 
 
-def problems_with(deposit, **options):
+def problems_with(deposit):
     """The problems of a deposit; none if it is whole."""
     try:
-        with whole_deposit(deposit, **options):
+        with whole_deposit(deposit):
             return []
     except DamagedDeposit as damaged:
         return list(damaged.args)
@@ -45,9 +37,11 @@ def problems_with(deposit, **options):
 
 def validated(deposit, *names):
     """Put a deposit to the validators of these names, or to all; return the finished process."""
-    only = ["--only", *names] if names else []
+    if not PYTHON.exists():
+        reason = "the validators are not installed: make validators-environment"
+        (pytest.fail if os.environ.get("ICHA_REQUIRE_VALIDATORS") == "1" else pytest.skip)(reason)
     return subprocess.run(
-        [python_of_validators(), REPOSITORY / "tests/validators/validate.py", deposit, *only],
+        [PYTHON, REPOSITORY / "tests/validators/validate.py", deposit, *names],
         capture_output=True,
         text=True,
         timeout=600,

@@ -4,6 +4,7 @@ import json
 from types import SimpleNamespace
 from urllib.parse import unquote
 
+import netCDF4
 import pytest
 import yaml
 from conftest import REPOSITORY
@@ -144,7 +145,27 @@ def test_the_crate_states_files_origin_authors_and_licence(tmp_path):
 def test_a_validator_accepts_the_crate_and_finds_problems(tmp_path):
     folder = written(tmp_path / "tiny", ALL)
     done = validated(sealed(folder), "roc-validator")
-    assert done.returncode == 0 and "checks of ro-crate-1.1, 0 problems" in done.stdout, done.stdout + done.stderr
+    assert done.returncode == 0 and "roc-validator: 0 problems" in done.stdout, done.stdout + done.stderr
     (folder / "dataset/mine.nc").unlink()
     done = validated(sealed(folder), "roc-validator")
     assert done.returncode == 1 and "dataset/mine.nc" in done.stdout
+
+
+@pytest.mark.slow
+def test_a_validator_finds_a_unit_that_is_none(tmp_path):
+    """A netCDF file with a variable in a group, whose axis is in the group above."""
+    with netCDF4.Dataset(tmp_path / "data.nc", "w") as data:
+        data.setncatts({"Conventions": "CF-1.11", "title": "Loads", "history": "made up"})
+        data.createDimension("step", 3)
+        step = data.createVariable("step", "i4", ("step",))
+        step.setncatts({"long_name": "step", "units": "1"})
+        step[:] = range(3)
+        load = data.createGroup("study").createVariable("load", "f8", ("step",))
+        load.setncatts({"long_name": "load", "units": "Pa"})
+        load[:] = [1.0, 2.0, 3.0]
+    done = validated(sealed(tmp_path), "compliance-checker")
+    assert done.returncode == 0, done.stdout + done.stderr
+    with netCDF4.Dataset(tmp_path / "data.nc", "a") as data:
+        data["study/load"].units = "pascalish"
+    done = validated(sealed(tmp_path), "compliance-checker")
+    assert done.returncode == 1 and "data.nc/study: " in done.stdout, done.stdout
