@@ -2,7 +2,7 @@
 
 The time of a run follows a power law. Powers and scales of the laws are least-squares fits to the logarithms of
 measured times, mostly on one core of an AMD EPYC. Of the times in `tests/planning/measured_times.csv`, 90 % differ
-from the law by less than a factor of two. The measured times of finished batches correct the times of other runs.
+from the law by less than a factor of two. The times of finished runs correct the times of other runs.
 """
 
 import math
@@ -207,9 +207,7 @@ def figure_cost(values: float, nodes: int) -> Cost:
 def correction(pairs: Sequence[tuple[float, float]]) -> float:
     """Return the factor that corrects expected times; `pairs` are expected and measured times of similar jobs, s.
 
-    For n pairs, the factor is m^(n/(n + 1)), where m is the median of measured/expected time; without pairs it is 1.
+    For n pairs, the factor is m^(n/(n + 1)), where m is the median of measured/expected time.
     """
-    if not pairs:
-        return 1.0
     ratio = statistics.median(math.log(measured / expected) for expected, measured in pairs)
     return math.exp(ratio * len(pairs) / (len(pairs) + 1))

@@ -14,10 +14,9 @@ from icha.datasets.attributes import why_failed
 from icha.datasets.stamp import OTHER_LICENCE, difference, read_stamp
 from icha.datasets.variables.campaign import STATUS_ATTRIBUTES
 from icha.planning import costs
-from icha.planning.measured_times import correct_costs
 from icha.planning.requirements import largest_grid, run_threads, surface_threads
 from icha.planning.results import NEEDED, campaign_files, expected_stamps
-from icha.planning.run_costs import run_costs
+from icha.planning.run_costs import corrected_costs, run_costs
 from icha.support import formatting
 from icha.support.formatting import format_count
 
@@ -95,14 +94,11 @@ def plan(campaign: Campaign, results: Path | None) -> list[Item]:
     computed from runs is done if it exists and no surface or run must be computed. Measured times of finished runs
     correct the expected times. If `results` is None, nothing counts as done.
     """
-    files, cost_of_run, items = campaign_files(campaign), run_costs(campaign), []
-
-    def state_of(path):
-        return TO_DO, ""
-
-    # Checksums and fingerprints take time.
+    files, items = campaign_files(campaign), []
     if results is not None and results.is_dir():
-        cost_of_run, state_of = correct_costs(campaign, cost_of_run, results), _states(campaign, results)
+        cost_of_run, state_of = corrected_costs(campaign, results), _states(campaign, results)
+    else:  # without checksums and fingerprints, which take time
+        cost_of_run, state_of = run_costs(campaign), lambda path: (TO_DO, "")
 
     def item(part, group, path, cost, threads=1):
         return Item(part, group, path, *state_of(path), cost, threads, min(1.0, cost.seconds / costs.BATCH))

@@ -1,7 +1,10 @@
-"""Expected cost of the runs of a campaign."""
+"""Expected cost of the runs of a campaign, corrected by the times of finished runs."""
 
 import math
+import re
+from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 from icha.configuration.campaign import Campaign
 from icha.configuration.cases import run_cases, run_settings
@@ -9,10 +12,15 @@ from icha.configuration.plausibility import energy_ratio
 from icha.datasets.labels import RunLabels
 from icha.path.targets import QUANTITIES
 from icha.planning import costs
+from icha.planning.results import campaign_files
 from icha.planning.validity import surface_facts
 
 # Assumed reduced pressure of a target that is given as a mean separation.
 _UNKNOWN_LOAD = 0.03
+
+
+# Line in the log of a batch for each computed file (workflow/scripts/job.py).
+_COMPUTED = re.compile(r"^[\w-]+/(runs/\S+): computed in (\S+) s$", re.MULTILINE)
 
 
 def run_costs(campaign: Campaign) -> dict[RunLabels, costs.Cost]:
@@ -25,6 +33,21 @@ def run_costs(campaign: Campaign) -> dict[RunLabels, costs.Cost]:
 
     cost = cache(lambda case: expected_cost(campaign, case, summits(case.surface)))
     return {case: cost(case._replace(seed=0)) for case in run_cases(campaign)}
+
+
+def corrected_costs(campaign: Campaign, results: Path) -> dict[RunLabels, costs.Cost]:
+    """Return the cost of each run, corrected by the times of the finished runs of its study and model in `results`."""
+    cost_of, runs = run_costs(campaign), campaign_files(campaign).runs
+    pairs: dict[tuple[str, str], list[tuple[float, float]]] = {}
+    for log in (results / "logs/runs").glob("*.log"):
+        for path, seconds in _COMPUTED.findall(log.read_text(encoding="utf-8", errors="replace")):
+            if case := runs.get(f"{path}.nc"):
+                pairs.setdefault((case.study, case.model), []).append((cost_of[case].seconds, float(seconds)))
+    factors = {key: costs.correction(each) for key, each in pairs.items()}
+    return {
+        case: replace(cost, seconds=cost.seconds * factors.get((case.study, case.model), 1.0))
+        for case, cost in cost_of.items()
+    }
 
 
 def expected_cost(campaign: Campaign, case: RunLabels, summits: float) -> costs.Cost:

@@ -90,7 +90,6 @@ def test_memory_of_a_dataset_is_estimated_from_the_files_of_its_runs(tmp_path):
 
 
 def test_what_jobs_took_corrects_what_is_expected_of_others():
-    assert costs.correction([]) == 1
     assert costs.correction([(1.0, 4.0)]) == pytest.approx(2.0)
     many = [(t, 4 * t) for t in np.linspace(1, 2, 99)]
     assert costs.correction(many) == pytest.approx(4.0, rel=0.02)

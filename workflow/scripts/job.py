@@ -3,6 +3,7 @@
 import contextlib
 import os
 import sys
+import time
 import traceback
 from contextlib import contextmanager
 
@@ -38,7 +39,7 @@ def job_context(snakemake):
 
 
 def compute_batch(outputs, arguments, task, program, licence):
-    """Compute those files of a batch that do not exist with their stamps; print a line for each of them.
+    """Compute those files of a batch that do not exist with their stamps; print their names and times.
 
     Raise ValueError if the program has changed since Snakemake planned the jobs: the stamps would be wrong.
 
@@ -55,8 +56,10 @@ def compute_batch(outputs, arguments, task, program, licence):
     for number, (output, each) in enumerate(zip(outputs, arguments, strict=True)):
         each["attributes"]["license"] = licence
         if not os.path.exists(output) or why_outdated(output, each["attributes"]):
-            print(f"{number + 1} of {len(outputs)}: {each['attributes']['id']}", flush=True)
+            name, start = each["attributes"]["id"], time.perf_counter()
+            print(f"{number + 1} of {len(outputs)}: {name}", flush=True)
             task(output=output, **each)
+            print(f"{name}: computed in {time.perf_counter() - start:.3g} s", flush=True)
 
 
 def _print(text, terminal):
