@@ -35,12 +35,8 @@ def targets_of(arguments: list[str]) -> list[str]:
 def read_configuration(workflow, root: str) -> Configuration:
     """Read the file of `--configfile`, or the default file in `root`, and replace values by those of `--config`.
 
-    Snakemake's own `config` is not used, because Snakemake would merge two files and accept duplicate keys.
-
-    Raises
-    ------
-    SystemExit
-        If the configuration has errors; the message lists the errors.
+    Snakemake's own `config` is not used, because Snakemake would merge two files and accept duplicate keys. If the
+    configuration has errors, the program ends with the list of the errors.
     """
     settings = workflow.config_settings
     files = [_shorten(path) for path in settings.configfiles]
@@ -69,14 +65,8 @@ class Results:
     def __init__(self, folder: str, file: str, stamps: Mapping[str, Stamp], *, dry_run: bool = False):
         """Lock the folder and remove outdated results, because Snakemake computes what is missing.
 
-        A dry run or a call that only reports changes nothing.
-
-        Parameters
-        ----------
-        folder : folder of the results, relative to the working directory; no other configuration may own the folder.
-        file : configuration file of the campaign.
-        stamps : expected stamps of computed files, by path.
-        dry_run : whether this call is a dry run.
+        A dry run or a call that only reports changes nothing. No configuration but `file` may own the folder. `stamps`
+        are the expected stamps of computed files, by path.
         """
         self.folder, self._origin = Path(folder), Path(file).resolve()
         if reason := find_conflict(self.folder, self._origin):
@@ -104,13 +94,7 @@ class Results:
                     state_licence(path, stamps[path]["license"])
 
     def begin(self) -> None:
-        """Prepare the folder before the first job starts.
-
-        Raises
-        ------
-        SystemExit
-            If another process runs the campaign, or results cannot be written.
-        """
+        """Prepare the folder before the first job starts; end if another process runs the campaign."""
         if self._other_process:
             raise SystemExit(
                 f"Process {self._other_process} is running this campaign in this directory; wait for it to end, or "

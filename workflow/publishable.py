@@ -9,13 +9,7 @@ from icha.deposit.program import Source, program_source, refuse_other_environmen
 
 
 def publishable_source(configuration: Configuration, project: str) -> Source:
-    """Return the source code that a deposit will contain.
-
-    Raises
-    ------
-    SystemExit
-        If metadata are missing, or if the versions of packages differ from the locked versions.
-    """
+    """Return the source that a deposit will contain; end if metadata or locked packages are missing."""
     campaign = configuration.campaign
     problems = [f"{configuration.origin}: {line}" for line in missing_metadata(campaign.deposit_metadata())]
     if problem := licence_problem(campaign):

@@ -13,16 +13,8 @@ _MOST_EXTENSIONS = 2
 def reach_accuracy(campaign, path: Path, folder: Path, cores: int, compute: Callable):
     """Increase the seeds of studies with `accuracy` until all intervals are narrow enough.
 
-    Parameters
-    ----------
-    campaign : content of the configuration file `path`.
-    folder : folder that contains results/.
-    cores : number of cores in use.
-    compute : function that computes targets of a campaign.
-
-    Returns
-    -------
-    The campaign with the last seeds, and the last choice of each study (`icha.planning.levels`).
+    `folder` contains results/; `compute` computes targets of a campaign. Return the campaign with the last seeds, and
+    the last choice of each study (`icha.planning.levels`).
     """
     from icha.configuration.load import load_configuration
     from icha.planning.levels import choose_levels, words_of_levels, write_levels

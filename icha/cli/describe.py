@@ -103,14 +103,7 @@ def _draw_scan(section, file: Path) -> None:
 def print_plan(path: Path, campaign, home: Path, cores: int, *, runs=False, local=True) -> None:
     """Print what a campaign computes, which results exist, the cost of missing results, and what prevents a run.
 
-    Parameters
-    ----------
-    path : configuration file of the campaign.
-    campaign : content of the configuration.
-    home : folder that contains results/.
-    cores : number of cores in use.
-    runs : whether to print a line for every file.
-    local : whether jobs run on this machine.
+    `home` contains results/; with `runs`, every file has a line; `local` is False if jobs run on other machines.
     """
     from rich.console import Console
     from rich.text import Text

@@ -110,13 +110,7 @@ def list_campaigns() -> dict[str, Path]:
 
 
 def find_configuration(config: str | None) -> Path:
-    """Find a configuration file by its path or by the name of its campaign; None means the default file.
-
-    Raises
-    ------
-    UserError
-        If the file does not exist.
-    """
+    """Find a configuration file by its path or by the name of its campaign; None means the default file."""
     files = list_campaigns()
     listed = f"expected a YAML file or a campaign: {', '.join(sorted(files))}. `icha new NAME` writes a new campaign"
     if config is None:
@@ -131,17 +125,9 @@ def find_configuration(config: str | None) -> Path:
 
 
 def read_configuration(path: Path, home: Path | None = None):
-    """Load a configuration with `icha.configuration.load.load_configuration`, and print its warnings.
+    """Load a configuration and print its warnings; raise `UserError` with all of its errors.
 
-    Parameters
-    ----------
-    path : configuration file.
-    home : folder that contains results/. Default: the folder of the project.
-
-    Raises
-    ------
-    UserError
-        If the configuration has errors; the message lists all errors.
+    `home` is the folder that contains results/. Default: the folder of the project.
     """
     from icha.configuration.errors import ConfigurationError
     from icha.configuration.load import load_configuration

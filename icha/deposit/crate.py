@@ -27,13 +27,7 @@ def write_crate(
 ) -> None:
     """Write the file `ro-crate-metadata.json` of a deposit.
 
-    Parameters
-    ----------
-    folder : folder of the deposit.
-    publication : complete metadata of the deposit.
-    campaign : name of the campaign.
-    revision : revision of the program whose source is in `source/`.
-    sizes : size in bytes of every file, by path in the deposit.
+    `revision` is that of the program in `source/`; `sizes` has the size in bytes of every file, by path in the deposit.
     """
     shown = [path for path in sorted(sizes) if not path.startswith(_PROGRAM) or path == _LICENCE]
     authors = [_author(author) for author in publication.authors]

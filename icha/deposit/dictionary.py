@@ -31,12 +31,7 @@ def data_dictionary(folder: Path, files: Iterable[str]) -> str:
     """Return the text of `data_dictionary.csv`, with one row for each variable of each kind of file.
 
     Files of one kind share their rows: `<name>` in a path stands for the part that differs. Columns of the table of all
-    runs have the descriptions of the variables with the same names.
-
-    Parameters
-    ----------
-    folder : folder of the files.
-    files : paths of the files, relative to `folder`; files other than netCDF and CSV are left out.
+    runs have the descriptions of the variables with the same names. Paths in `files` are relative to `folder`.
     """
     found: Counter[tuple[str, ...]] = Counter()
     long_names: dict[str, str] = {}

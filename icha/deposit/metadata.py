@@ -61,13 +61,7 @@ def web_address(identifier: str) -> str:
 
 
 def citation_cff(publication: Publication, revision: str) -> str:
-    """Return CITATION.cff of the data, in Citation File Format 1.2.0 (https://doi.org/10.5281/zenodo.5171937).
-
-    Parameters
-    ----------
-    publication : complete metadata (`icha.configuration.publication.missing_metadata`).
-    revision : revision of the program that made the data.
-    """
+    """Return CITATION.cff of the data, in Citation File Format 1.2.0 (https://doi.org/10.5281/zenodo.5171937)."""
     is_common = publication.license in COMMON_LICENCES
     paper = {
         "type": "article",

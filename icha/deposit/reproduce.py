@@ -126,11 +126,8 @@ def results_without_scripts(project: Path) -> list[str]:
 def prepare_rerun(folder: Path, deposit: Path) -> Path:
     """Copy configuration and inputs of a deposit to the folder of a rerun, unless an earlier command did so.
 
-    Raises
-    ------
-    RerunError
-        If the folder has other files or belongs to another deposit, or if the configuration cannot be run, for example
-        because the configuration names files outside the deposit.
+    Raise `RerunError` if the folder has other files or belongs to another deposit, or if the configuration cannot be
+    run, for example because it names files outside the deposit.
     """
     if folder.resolve().is_relative_to(deposit.resolve()):
         raise RerunError(f"--folder {folder}: is inside the deposit, which must not change; expected another folder")

@@ -20,13 +20,9 @@ class ZenodoError(Exception):
 
 
 def server_address(address: str) -> str:
-    """Return the address of a server without a path.
+    """Return the address of a server without a path; raise ValueError for other texts.
 
-    Raises
-    ------
-    ValueError
-        If `address` is not the address of a server; or if it begins with http, because others could then read the
-        token. A server on this machine may have an address with http.
+    With http, others could read the token. So only a server on this machine may have an address with http.
     """
     parts = urlsplit(address if "//" in address else f"https://{address}")
     plain = not (parts.username or parts.query or parts.fragment) and parts.path.rstrip("/") in ("", "/api")

@@ -44,14 +44,9 @@ class DamagedDeposit(ValueError):
 def whole_deposit(path: str | os.PathLike) -> Iterator[Path]:
     """Verify a deposit, a folder or a zip, and yield its folder; a zip is extracted into a temporary folder.
 
-    Empty folders are ignored.
-
-    Raises
-    ------
-    DamagedDeposit
-        If files differ from their checksums, are missing or were added, or if the deposit cannot be read safely.
-    OSError
-        If a zip cannot be extracted, for instance because the disk is full.
+    Raise `DamagedDeposit` if files differ from their checksums, are missing or were added, or if the deposit cannot be
+    read safely; raise OSError if a zip cannot be extracted, for instance because the disk is full. Empty folders are
+    ignored.
     """
     folder = Path(path)
     with contextlib.ExitStack() as opened:
@@ -69,13 +64,7 @@ def files_of(folder: Path) -> list[str]:
 
 
 def read_text(folder: Path, name: str) -> str:
-    """Read a text file of a deposit.
-
-    Raises
-    ------
-    ValueError
-        If the file has more than `LARGEST_TEXT` bytes, or is not UTF-8.
-    """
+    """Read a text file of a deposit; raise ValueError if it has more than `LARGEST_TEXT` bytes, or is not UTF-8."""
     size = (folder / name).stat().st_size
     if size > LARGEST_TEXT:
         raise ValueError(f"{name}: has {formatting.size(size)}; expected at most {formatting.size(LARGEST_TEXT)}")

@@ -68,11 +68,7 @@ class Choice(NamedTuple):
 def choose_levels(campaign: Campaign, results: Path, cores: int) -> dict[str, Choice]:
     """Return the choice of each study with `accuracy`, by name; the campaign dataset must exist.
 
-    Parameters
-    ----------
-    campaign : campaign with the present seeds.
-    results : folder of the results of the campaign.
-    cores : number of cores that share the runs; a budget is a time on these cores.
+    A budget is a time on `cores` cores, which share the runs.
     """
     studies = {name: study for name, study in campaign.studies.items() if study.accuracy is not None}
     if not studies:

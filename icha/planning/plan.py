@@ -178,10 +178,7 @@ def time_on(items: Iterable[Item], cores: int) -> float:
 
 
 def memory_on(items: Iterable[Item], cores: int) -> float:
-    """Return the largest memory in bytes that Snakemake and its parallel jobs use together.
-
-    Snakemake lets parallel jobs together use at most `_MOST_MEMORY`, unless a single job needs more.
-    """
+    """Return the largest memory in bytes that Snakemake and its parallel jobs use together."""
     left = sorted((item.cost.memory for item in items if item.to_do), reverse=True)
     return costs.WORKFLOW_MEMORY + min(sum(left[:cores]), max(_MOST_MEMORY, left[0])) if left else 0.0
 

@@ -28,18 +28,9 @@ def sha256_of(file: Path) -> str:
 
 
 def refuse_changed(file: str | os.PathLike, sha256: str, name: str | os.PathLike | None = None) -> None:
-    """Raise an error if a file has changed; otherwise the results would be attributed to the old content.
+    """Raise ValueError if a file has another checksum; otherwise results would be attributed to its old content.
 
-    Parameters
-    ----------
-    file : path of the file.
-    sha256 : expected checksum of the file.
-    name : original name of a copied file, for the message.
-
-    Raises
-    ------
-    ValueError
-        If the checksum differs.
+    `name` is the original name of a copied file, for the message.
     """
     if sha256_of(Path(file)) != sha256:
         raise ValueError(f"{name or file} has changed since the campaign started; repeat the command")

@@ -18,12 +18,8 @@ _DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 def fingerprint(*modules: str, script: Path | None = None) -> str:
     """Return the fingerprint of modules of ICHA, of all modules that they import, and of the data files of all of them.
 
-    A data file counts if a module in the same folder contains the name of the file, or of the folder of the file.
-
-    Parameters
-    ----------
-    modules : names of modules.
-    script : Python file outside the package; the file and the modules of ICHA that it imports count, too.
+    A data file counts if a module in the same folder contains the name of the file, or of the folder of the file. A
+    `script` is a Python file outside the package; the file and the modules of ICHA that it imports count, too.
     """
     digest = hashlib.sha256()
     if script is not None:
@@ -37,12 +33,8 @@ def fingerprint(*modules: str, script: Path | None = None) -> str:
 def imported_modules(*modules: str) -> list[str]:
     """Return the sorted names of modules of ICHA and of all modules that they import, directly or indirectly.
 
-    Importing a module does not add the `__init__` of its package.
-
-    Raises
-    ------
-    ValueError
-        If a module imports a name from `icha` itself, because then the module that defines the name is unknown.
+    Importing a module does not add the `__init__` of its package. Raise ValueError if a module imports a name from
+    `icha` itself, because then the module that defines the name is unknown.
     """
     graph = _graph()
     found = sorted({*modules}.union(*map(graph.find_upstream_modules, modules)))

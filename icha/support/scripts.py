@@ -12,10 +12,7 @@ from icha.support.input_files import problem_with_path
 def caption_in(script: str | os.PathLike) -> str:
     """Return the docstring of the function `draw` in a script, without running the script.
 
-    Raises
-    ------
-    ValueError
-        If the file cannot be read, is not Python, or has no such function.
+    Raise ValueError if the file cannot be read, is not Python, or has no such function.
     """
     tree = _parse(Path(script))
     for node in tree.body:
@@ -27,12 +24,8 @@ def caption_in(script: str | os.PathLike) -> str:
 def modules_of(script: str | os.PathLike) -> list[Path]:
     """Return the files of the modules that a script imports from its own folder, sorted; nothing is run.
 
-    The modules that these modules import count too. Of a package, all Python files count.
-
-    Raises
-    ------
-    ValueError
-        If one of these files cannot be read, or is not Python.
+    The modules that these modules import count too. Of a package, all Python files count. Raise ValueError if one of
+    these files cannot be read, or is not Python.
     """
     script = Path(script).resolve()
     found, pending = {script}, [script]

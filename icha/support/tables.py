@@ -65,16 +65,8 @@ def split_fields(line: str, delimiter: str) -> list[str]:
 def read_rows(path: str | os.PathLike) -> tuple[list[Row], list[str]]:
     """Read the rows of a table: one row in each line, with one number of fields in all rows.
 
-    Tabs, semicolons, commas or blanks separate the fields. Empty lines and lines that begin with # do not count.
-
-    Returns
-    -------
-    Rows, and the lines that begin with #, without this sign.
-
-    Raises
-    ------
-    ValueError
-        If the file cannot be read, or if a row has another number of fields than the first row.
+    Tabs, semicolons, commas or blanks separate the fields. Empty lines and lines that begin with # do not count. Return
+    the rows, and the lines that begin with #, without this sign; raise ValueError if the file cannot be read.
     """
     if problem := problem_with_path(path):
         raise ValueError(f"{problem}; expected a text file with a table")
@@ -100,10 +92,7 @@ def read_rows(path: str | os.PathLike) -> tuple[list[Row], list[str]]:
 def read_table(path: str | os.PathLike) -> tuple[list[str], list[Row]]:
     """Read a table with a line of headings; return the headings and the rows below.
 
-    Raises
-    ------
-    ValueError
-        If the file cannot be read, or if a row does not have as many fields as there are headings.
+    Raise ValueError if the file cannot be read, or if a row does not have as many fields as there are headings.
     """
     rows, _ = read_rows(path)
     if len(rows) < 2:

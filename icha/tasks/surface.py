@@ -21,12 +21,8 @@ def make_surface(output, *, name, seed, settings, height_map=None, sha256=None, 
 
     Parameters
     ----------
-    output : file to write.
-    name, seed : name and seed of the surface.
     settings : settings of the surface in the configuration, in SI units.
-    height_map : file of the heights; None for a surface that needs no file.
-    sha256 : expected checksum of the file of the heights.
-    attributes : attributes of the file.
+    height_map, sha256 : file of the heights, and its expected checksum; None for a surface that needs no file.
     """
     spectrum = measured = None
     if settings["kind"] == "self_affine":

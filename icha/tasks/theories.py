@@ -15,9 +15,7 @@ def make_theories(surface, output, *, settings, adhesive, attributes):
     Parameters
     ----------
     surface, output : surface file to read, and file to write.
-    settings : settings of the surface, in SI units.
-    adhesive : rms slopes and materials of the contacts with adhesion, in SI units.
-    attributes : attributes of the file.
+    settings, adhesive : the surface; rms slopes and materials of the contacts with adhesion; in SI units.
     """
     keys = ("period", "rolloff_wavelength", "short_wavelength", "hurst")
     known = settings["kind"] == "self_affine"

@@ -3,30 +3,18 @@
 Without Slurm the test is skipped, or fails with `ICHA_REQUIRE_SLURM=1`.
 """
 
-import hashlib
 import os
 import subprocess
 
 import pytest
 import yaml
 from conftest import REPOSITORY, copy_project, snakemake
+from digests import results_of
 from slurm.single_node import single_node, why_not
 from tiny_campaign import CAMPAIGN
 
 PYTHON = REPOSITORY / ".venv-slurm/bin/python"
 CONFIGURATION = "config/campaigns/tiny.yaml"
-# Folders of files with measured times.
-MEASURED = ("logs", "benchmarks")
-
-
-def results_of(project):
-    """Return checksums of all results, without files that contain measured times."""
-    folder = project / "results/tiny"
-    return {
-        str(file.relative_to(folder)): hashlib.sha256(file.read_bytes()).hexdigest()
-        for file in sorted(folder.rglob("*"))
-        if file.is_file() and file.relative_to(folder).parts[0] not in MEASURED
-    }
 
 
 def call_with_profile(node, project):
@@ -68,7 +56,7 @@ def test_a_campaign_on_slurm_has_the_bytes_of_a_local_one(tmp_path):
         assert again.returncode == 0 and len(records) == 1, again.stdout
         (log,) = (remote / "results/tiny/logs/runs").iterdir()
         assert log.read_text().count(": tiny/runs/") == 1
-    assert results_of(remote) == results_of(local)
+    assert results_of(remote, "tiny") == results_of(local, "tiny")
 
 
 def test_the_profile_has_the_options_of_the_default_profile():

@@ -1,6 +1,5 @@
 """A whole campaign as users run it; refused calls and wrong configurations."""
 
-import hashlib
 import json
 import os
 import subprocess
@@ -13,6 +12,7 @@ import pytest
 import xarray as xr
 import yaml
 from conftest import FIGURES, REPOSITORY, SMOKE, TRACES, snakemake
+from digests import results_of
 from traces import traces
 
 from icha.configuration.cases import campaign_sha256
@@ -36,18 +36,8 @@ publish/smoke-0.0.1/SHA256SUMS publish/smoke-0.0.1/dataset/smoke.nc publish/smok
 """
 
 
-def results_of(project):
-    """Return checksums of all results, without files that contain measured times."""
-    folder = project / "results/smoke"
-    return {
-        str(file.relative_to(folder)): hashlib.sha256(file.read_bytes()).hexdigest()
-        for file in sorted(folder.rglob("*"))
-        if file.is_file() and file.relative_to(folder).parts[0] not in ("logs", "benchmarks")
-    }
-
-
 def test_all_promised_files_exist(smoke):
-    files = results_of(smoke)
+    files = results_of(smoke, "smoke")
     promised = {
         *PROMISED.split(),
         *(f"figures/{figure}.{ending}" for figure in FIGURES for ending in FIGURE_ENDINGS),
@@ -97,7 +87,7 @@ def test_the_deposit_agrees_with_its_checksums(smoke):
 def test_no_paths_users_hosts_or_times_in_results(smoke):
     words = [str(smoke), str(REPOSITORY), *TRACES.values()]
     words += [os.uname().nodename] if len(os.uname().nodename) > 3 else []
-    for name in results_of(smoke):
+    for name in results_of(smoke, "smoke"):
         content = (smoke / "results/smoke" / name).read_bytes()
         assert not [word for word in words if word.encode() in content], name
     deposit = smoke / "results/smoke/publish/smoke-0.0.1"

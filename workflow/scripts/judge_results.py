@@ -13,15 +13,7 @@ from icha.support.checksums import write_checksums
 def judge_results(checks, output, *, known):
     """Read the checks of a campaign and write the verdict: how many checks passed, and the known failures.
 
-    Parameters
-    ----------
-    checks, output : file of checks to read, and file of the verdict to write.
-    known : for each run that is known to fail, the reason.
-
-    Raises
-    ------
-    ValueError
-        If a check has failed and is not a known failure; the message lists the failed checks.
+    `known` has a reason for each run that is known to fail. Raise ValueError with the failed checks of other runs.
     """
     found = read_checks(checks)
     failed = sum(not check.passed for check in found)

@@ -12,15 +12,7 @@ from icha.planning.plan import whole_cost
 
 
 def publish(archive, *, results, files, project):
-    """Write the deposit as a zip and as a folder.
-
-    Parameters
-    ----------
-    archive : zip file to write.
-    results : folder of the results.
-    files : files of the results that the deposit includes.
-    project : folder of the workflow.
-    """
+    """Write the deposit as a zip and as a folder; `files` are the results that the deposit includes."""
     campaign = load_configuration(Path(results, CONFIGURATION)).campaign
     refuse_mixed(Path(results), campaign)
     make_deposit(
