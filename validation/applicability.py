@@ -1,32 +1,31 @@
 """Applicability of the asperity model: its areas and gaps compared with boundary elements on sixty surfaces.
 
-python -m validation.applicability
+    python -m validation.applicability [--parts PART ...] [--tables]
 
-The surfaces are of ten kinds. Adhesion ranges from none to so strong that full contact has the lower energy. Results of
-boundary elements are saved case by case, so an interrupted command resumes. The asperity model is computed anew. All
+The surfaces are of ten kinds. Adhesion ranges from none to so strong that full contact has the lower energy. All
 surfaces were examined when the limits of contact area and gap (`icha.path.targets`) were chosen.
 """
 
 from __future__ import annotations
 
-import json
 import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from functools import partial
+from itertools import product
 from pathlib import Path as FilePath
 from typing import NamedTuple
 
 import numpy as np
 import scipy.fft
 import xarray as xr
-from threadpoolctl import threadpool_limits
 
 from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, read_scan, simulate
 from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
-from validation.tables import Table, write_tables
+from validation.measurements import Parts, Rows, measure_page, read_rows
+from validation.tables import Table
 
 _ROOT = FilePath(__file__).resolve().parents[1]
-_RESULTS = _ROOT / "validation/results/applicability.json"
 KINDS = (
     *("random", "random, Gaussian amplitudes", "egg box", "two waves", "ridges"),
     *("pits", "bumps", "plateaus", "skewed", "scan"),
@@ -34,6 +33,7 @@ KINDS = (
 # Ranges of U_full/dgamma of the surfaces of a kind; about half of the surfaces in the first range have no adhesion.
 _ENERGY_RATIOS = ((20.0, 50.0), (10.0, 20.0), (5.0, 10.0), (2.5, 5.0), (1.3, 2.5), (0.7, 1.3))
 COUNT = len(KINDS) * len(_ENERGY_RATIOS)
+_HALVES = {"first half": range(COUNT // 2), "second half": range(COUNT // 2, COUNT)}
 _SCANS = (
     "config/topographies/published/al3d-1.al3d",
     "tests/data/topographies/top-1.top",
@@ -146,7 +146,7 @@ def press(surface: Surface, material: Material, model: str, largest: float = LOA
     """Return the run of a model at `LOADS` up to the largest; a run that ends early has only the loads it reached."""
     loads = [load for load in LOADS if load <= largest]
     path = Path(reduced_pressures=loads, snapshots=[("reduced_pressure", load) for load in loads])
-    with threadpool_limits(1), warnings.catch_warnings():
+    with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
             return simulate(surface, material, path, model=model)
@@ -178,43 +178,50 @@ def largest_factor(found: Mapping[float, State], exact: Mapping[float, State]) -
     return max(factors, default=math.nan)
 
 
+def solve_reference(number: int) -> Iterator[dict]:
+    """Yield the states of boundary elements of a number, by load."""
+    _, surface, material = case(number)
+    for load, state in states(press(surface, material, REFERENCE_MODEL)).items():
+        yield {"number": number, "load": load, "state": state}
+
+
 def reference(number: int) -> dict[float, State]:
-    """Return the states of boundary elements of a number, from the saved results or computed and saved."""
-    saved = json.loads(_RESULTS.read_text(encoding="utf-8")) if _RESULTS.exists() else {}
-    if str(number) not in saved:
-        _, surface, material = case(number)
-        saved[str(number)] = states(press(surface, material, REFERENCE_MODEL))
-        _RESULTS.write_text(json.dumps(saved) + "\n", encoding="utf-8")
-    return {float(load): State(*state) for load, state in saved[str(number)].items()}
+    """Return the saved states of boundary elements of a number, by load."""
+    rows = read_rows("applicability", ["boundary_elements"])["boundary_elements"]
+    return {row["load"]: State(*row["state"]) for row in rows if row["number"] == number}
 
 
-def confusion(half: str, numbers: range) -> list[list[str]]:
-    """Return rows of the table: numbers of surfaces that are right or wrong, marked or not, for each largest load."""
-    rows = []
-    for largest in LARGEST_LOADS:
-        found = []
-        for number in numbers:
-            _, surface, material = case(number)
-            run = press(surface, material, DEFAULT_MODEL, largest)
-            factor = largest_factor(states(run), reference(number))
-            found.append((factor, bool(run.attrs["applicability"])))
-            print(f"{number} up to {largest:g}: {factor:.2f} {run.attrs['applicability']}", flush=True)
+def judge(number: int, largest: float) -> dict:
+    """Return the largest error of the asperity model up to a load, as a factor, and whether the run is marked."""
+    _, surface, material = case(number)
+    run = press(surface, material, DEFAULT_MODEL, largest)
+    factor, marked = largest_factor(states(run), reference(number)), bool(run.attrs["applicability"])
+    return {"number": number, "largest": largest, "factor": factor, "marked": marked}
+
+
+PARTS: Parts = {
+    "boundary_elements": (solve_reference, [(number,) for number in range(COUNT)]),
+    "asperities": (judge, [*product(range(COUNT), LARGEST_LOADS)]),
+}
+
+
+def tables(rows: Rows) -> dict[str, Table]:
+    """Return the table of the page: numbers of surfaces that are right or wrong, marked or not, by largest load."""
+    lines = []
+    for (half, numbers), largest in product(_HALVES.items(), LARGEST_LOADS):
+        found = [row for row in rows["asperities"] if row["number"] in numbers and row["largest"] == largest]
+        found = [(row["factor"] > WRONG_FACTOR, row["marked"], row["factor"]) for row in found if row["factor"] > 0]
         counts = [
-            sum(marked == wanted and (factor > WRONG_FACTOR) == wrong for factor, marked in found if factor > 0)
-            for wrong, wanted in ((True, True), (True, False), (False, True), (False, False))
+            str(sum(each[:2] == kind for each in found))
+            for kind in ((True, True), (True, False), (False, True), (False, False))
         ]
-        worst = max((factor for factor, marked in found if not marked and factor > 0), default=1.0)
-        rows.append([half, f"{largest:g}", *map(str, counts), f"{worst:.2f}"])
-    return rows
-
-
-def main() -> None:
-    """Compare the models on all surfaces and write the table."""
-    half = COUNT // 2
+        worst = max((factor for _, marked, factor in found if not marked), default=1.0)
+        lines.append([half, f"{largest:g}", *counts, f"{worst:.2f}"])
     head = ["surfaces", "largest *p\\**", "wrong, marked", "wrong, not marked", "right, marked", "right, not marked"]
-    rows = confusion("first half", range(half)) + confusion("second half", range(half, COUNT))
-    write_tables({"applicability": Table([*head, "largest factor without a mark"], rows)})
+    return {"applicability": Table([*head, "largest factor without a mark"], lines)}
 
+
+read_measurements = partial(read_rows, "applicability", PARTS)
 
 if __name__ == "__main__":
-    main()
+    measure_page("applicability", PARTS, tables, __doc__)

@@ -33,10 +33,6 @@ PARTS: Parts = {
     "layer_limits": (rough.layer_limits, [()]),
     "convergence": (rough.rough_loop, [(64,), (128,), (256,)]),
     "smooth_loop": (rough.smooth_loop, [()]),
-    "direction": (
-        rough.directed_sphere,
-        [(spacing, *others) for others, spacing in product(((3, 3.0), (10, 3.0), (10, 4.0)), (1 / 4, 1 / 5, None))],
-    ),
     "front": (
         single.pinned_front,
         [(cells, *others) for others, cells in product(((2, 0), (4, 0), (8, 0), (2, 3.0)), (16, 32, 48))],
@@ -103,10 +99,6 @@ _BY_ROW = {
         area_over: A/(πRδ) .3f; force_error: force %""",
     "convergence": """grid: grid g; wave_cells: cells in the shortest wave g; steps: equilibria g;
         pull_off: pull-off .4f; loss: loss .3f; largest_area: largest area .3f; seconds: time in s .1f""",
-    "direction": """ratio: ratio of works g; model: model s; cells: cells in the radius .3g; kind: pull-off of s;
-        advancing: advancing work .1%; standing: standing radius .1%; stiffness: stiffness 2E*a .1%;
-        receding: receding work .1%; pull_off: pull-off %; front: front dissipation %;
-        unattributed: unattributed loss .2%""",
     "front": """work: work of adhesion s; waves: waves of the front g; cells: cells in the radius g;
         shift: shift in cells .3f; error: error of the shift %""",
 }

@@ -1,4 +1,4 @@
-"""Rough spheres on a free half-space: convergence with the grid, and computing times.
+"""Rough spheres on a free half-space: convergence and computing times; layers, and contacts without adhesion.
 
 Units: E* = 1 Pa, dgamma = 1 J/m^2 and a sphere of radius 1 m, as in `validation.indenter_contacts`.
 """
@@ -12,16 +12,13 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path as File
 
 import numpy as np
-import xarray as xr
 
 from icha import Material, Path, SelfAffineSpectrum, Surface, simulate
 from icha.boundary_elements.contact import contact_of
 from icha.boundary_elements.elastic import wave_numbers
 from icha.half_space.layer import Layer, layer_compliance
-from icha.references.indentation import sphere_contact, sphere_pull_off
 from icha.surfaces.shapes import Paraboloid
 from validation.indenter_contacts import ADHESIVE, BARE, PULL_OFF, Shifted
-from validation.surfaces import paraboloid
 
 ROOT = File(__file__).resolve().parents[1]
 # ContactMechanics is installed there by `make .venv-benchmarks/.installed`.
@@ -47,18 +44,12 @@ def rough_sphere(
     return Surface(fine, side, "free", Shifted(Paraboloid((1.0, 1.0)), (shift, shift)))
 
 
-def follow(surface: Surface, material: Material, indentation: float) -> xr.Dataset:
-    """Load to an indentation (m) and unload."""
-    path = Path(indentations=[indentation], unload=True)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        return simulate(surface, material, path, model="boundary_elements")
-
-
 def _timed_loop(surface, indentation):
     """Return a row with the computing time of a loop to an indentation (m), and the run."""
-    clock = time.process_time()
-    run = follow(surface, ADHESIVE, indentation)
+    clock, path = time.process_time(), Path(indentations=[indentation], unload=True)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        run = simulate(surface, ADHESIVE, path, model="boundary_elements")
     seconds, pull_off = time.process_time() - clock, -float(run.nominal_pressure.min()) * surface.period**2 / PULL_OFF
     return {"grid": surface.grid, "steps": run.sizes["step"], "seconds": seconds, "pull_off": pull_off}, run
 
@@ -81,52 +72,6 @@ def rough_loop(grid: int, waves: tuple[float, float] = (2.0, 1.0), seed: int = 1
 def smooth_loop(grid: int = 96) -> dict:
     """Follow a loop of the smooth sphere to 2.4 contact radii of zero load, with computing time."""
     return _timed_loop(Surface(np.zeros((grid, grid)), grid / 6, "free", Paraboloid((1.0, 1.0))), 4.0)[0]
-
-
-def directed_sphere(spacing: float | None, ratio: float, radius: float, grid: int = 64) -> dict:
-    """Return the errors of a loop of a smooth sphere whose front recedes at a larger work of adhesion than it advances.
-
-    Without load, the front would advance to a radius of about 1.8. The largest tension is that of JKR with the receding
-    work or, if the contact is smaller than there, that of a punch of the largest radius.
-
-    spacing : cell size; None for the asperity model, with one sphere in a periodic cell, whose stiffness is not
-        compared because it depends on the images.
-    ratio, radius : receding over advancing work, and contact radius at the largest load.
-    """
-    material = Material(1.0, (1.0, ratio), 0.2)
-    if spacing:
-        surface = Surface(np.zeros((grid, grid)), grid * spacing, "free", Paraboloid((1.0, 1.0)))
-        run = follow(surface, material, float(sphere_contact(radius, 1.0, 1.0, 1.0).indentation))
-    else:
-        surface = paraboloid(grid, 40.0, 0.29)
-        path = Path(area_fractions=[math.pi * (radius / surface.period) ** 2], unload=True)
-        run = simulate(surface, material, path, model="asperities")
-    area, force, stiffness = (
-        run[name].values * surface.period**2
-        for name in ("contact_area_fraction", "nominal_pressure", "contact_stiffness")
-    )
-    a, turn = np.sqrt(area / math.pi), int(np.argmax(area))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        rate = (4 / 3 * a**3 - force) ** 2 / (8 * math.pi * a**3)
-    loads, stands = slice(1, turn + 1), (run.leg == 1).values & (rate > 1.1) & (rate < 0.5 * (1 + ratio))
-    recedes = (run.leg == 1).values & (a < 0.97 * a[turn]) & (a > 0.7 * a[turn])
-    largest = -float(
-        sphere_contact(min(a[turn], sphere_pull_off(1.0, 1.0, ratio).contact_radius), 1.0, 1.0, ratio).force
-    )
-    front = (ratio - 1) * area[turn] / surface.period**2
-    return {
-        "ratio": ratio,
-        "model": "boundary elements" if spacing else "asperities",
-        "cells": a[turn] / spacing if spacing else None,
-        "kind": "JKR" if sphere_pull_off(1.0, 1.0, ratio).contact_radius < a[turn] else "punch",
-        "advancing": float(np.abs(rate[loads] - 1).max()),
-        "standing": float(np.abs(a[stands] / a[turn] - 1).max()),
-        "stiffness": float(np.abs(stiffness[stands] / (2 * a[turn]) - 1).max()) if spacing else None,
-        "receding": float(np.abs(rate[recedes] / ratio - 1).max()) if recedes.any() else math.nan,
-        "pull_off": -force.min() / largest - 1,
-        "front": float(run.front_dissipation) / front - 1,
-        "unattributed": float(abs(run.loss_unattributed) / run.hysteresis_loss),
-    }
 
 
 def without_adhesion(kind: str, grid: int = 64) -> Iterator[dict]:

@@ -5,7 +5,7 @@ import re
 import pytest
 
 from benchmarks import tables as benchmarks
-from validation import indenter, jkr_test, loop_grid, short_range
+from validation import applicability, indenter, jkr_test, loop_grid, short_range
 from validation.tables import DOCS
 
 
@@ -23,8 +23,9 @@ def test_every_table_is_included_by_one_page():
         lambda: indenter.tables(indenter.read_measurements()),
         lambda: loop_grid.tables(loop_grid.read_measurements()),
         lambda: jkr_test.tables(jkr_test.read_measurements()),
+        lambda: applicability.tables(applicability.read_measurements()),
     ],
-    ids=["benchmarks", "short_range", "indenter", "loop_grid", "jkr_test"],
+    ids=["benchmarks", "short_range", "indenter", "loop_grid", "jkr_test", "applicability"],
 )
 def test_tables_agree_with_the_saved_measurements(tables):
     for name, table in tables().items():
