@@ -10,8 +10,6 @@ import numpy as np
 # Largest relative error of an identity between values of one dataset.
 IDENTITY_LIMIT = 1e-8
 
-# Name, value, limit and description of a check.
-Finding = tuple[str, float, float, str]
 # Values of a run that are not valid if the run fails a check: all values, or only those of the hysteresis loss.
 EVERYTHING, LOSS = "everything", "loss"
 

@@ -47,13 +47,6 @@ LOOP_CHECKS = {name: Definition(words) for name, words in _STATES.items()}
 LOOP_CHECKS |= {name: Definition(words, invalidates=LOSS) for name, words in _ENERGIES.items()}
 
 
-def check_events(run) -> Iterator[tuple]:
-    """Yield the check of events, for a run that continues after the first loading: name, value and limit."""
-    logged = np.bincount(run["event_kind"], minlength=len(EVENT_COUNTS))
-    counted = np.array([int(run[name][-1]) for name in EVENT_COUNTS])
-    yield "events", np.abs(logged - counted).sum(), 0
-
-
 def check_loop(run) -> Iterator[tuple]:
     """Yield name, value and limit of the checks of a loop: losses, pull-off and complete separation at the end."""
     # All energies are differences of works, so their errors are relative to the largest work.

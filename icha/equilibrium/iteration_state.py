@@ -82,11 +82,6 @@ class IterationState:
         lacks_site[self.sites.asperity[single]] = False
         return lacks_site
 
-    @property
-    def asperities_jumped_in(self) -> list[int]:
-        """Indices of the asperities that have jumped into contact during this search."""
-        return [row[4] for row in self.log if row[0] == JUMP_IN]
-
     def with_approach(self, approach) -> IterationState:
         """Return a copy of the state with other approaches (n,) of its sites, m."""
         return replace(self, sites=replace(self.sites, approach=approach))

@@ -191,7 +191,7 @@ def _break_contact(state, breaking):
     jump-in is deleted from the log, and no jump-off is logged.
     """
     sites, law = state.sites, state.contact.law
-    new = np.isin(sites.asperity, state.asperities_jumped_in) & breaking
+    new = np.isin(sites.asperity, [row[4] for row in state.log if row[0] == JUMP_IN]) & breaking
     spots = np.flatnonzero(breaking & ~new)
     R = sites.radius_of_curvature[spots]
     energy = law.jump_off_energy(R, sites.contact_radius[spots])

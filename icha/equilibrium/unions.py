@@ -31,7 +31,9 @@ def merge_overlapping(state: IterationState, evaluation: Evaluation, margin=0.0,
         return state
     (i, j), position, R = pairs.T, sites.position, sites.radius_of_curvature
     centre, radius, curvature = equivalent_spots(law, position[i], a[i], R[i], position[j], a[j], R[j], cell)
-    unions = _record_unions(sites, pairs, a)
+    unions = np.full(len(pairs), None)
+    for k, pair in enumerate(pairs):
+        unions[k] = MergeRecord(np.nan, a[pair], {name: getattr(sites, name)[pair] for name in Sites.UNITED})
     # A candidate in a pair makes contact before it becomes part of the union.
     candidates = pairs[sites.status[pairs] == CANDIDATE]
     state = state.with_events(JUMP_IN, sites.position[candidates], 1, 0.0, sites.asperity[candidates])
@@ -96,14 +98,6 @@ def _select_merging_pairs(state, evaluation, margin, deep):
     if not len(overlap):
         return np.empty((0, 2), dtype=int)
     return disjoint_pairs(overlapping_pairs(sites.position, a, first[overlap], second[overlap], r[overlap]))
-
-
-def _record_unions(sites, pairs, a):
-    """Return a `MergeRecord` for each of k pairs of sites; `a` (n,): contact radii of the sites, m."""
-    unions = np.full(len(pairs), None)
-    for k, pair in enumerate(pairs):
-        unions[k] = MergeRecord(np.nan, a[pair], {name: getattr(sites, name)[pair] for name in Sites.UNITED})
-    return unions
 
 
 def record_union_radii(sites: Sites, a) -> np.ndarray:

@@ -188,11 +188,6 @@ def theory_of(shape: Shape, *, adhesive: bool) -> str:
     return ("JKR" if adhesive else "Hertz") + counts_as
 
 
-def punch_force(indentation, punch_radius, contact_modulus):
-    """Return the force on a cylinder with a flat end, F = 2 a E* delta, N (Boussinesq; Johnson 1985, section 3.8)."""
-    return 2 * punch_radius * contact_modulus * np.asarray(indentation, float)
-
-
 def punch_pull_off(punch_radius, contact_modulus, work_of_adhesion) -> ContactState:
     """Return the state at which a flat-ended cylinder breaks off, F = -sqrt(8 pi E* w a^3), by Kendall (1971)."""
     return _with_adhesion(np.asarray(punch_radius, float), 0.0, 0.0, contact_modulus, work_of_adhesion)

@@ -51,7 +51,7 @@ def analyse(runs, outputs, *, stamps, compared, varied, samples, attributes, des
     if "sensitivity" in outputs:
         found = sensitivity_of_campaign(tree, samples, attrs=described_as("sensitivity"))
         write_dataset(found, outputs["sensitivity"])
-    checks = check_campaign(tree, runs.values())
+    checks = check_campaign(tree)
     for check in worst(checks):
         print(f"{check.name}: {check.value:.3g}, at most {check.limit:g} ({check.subject})")
     write_checks(checks, outputs["checks"])
