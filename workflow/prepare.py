@@ -77,21 +77,16 @@ class Results:
             wrong = dict(outdated(stamps))
         except OSError as error:
             raise SystemExit(f"{folder}: results cannot be read: {error}. Nothing was computed.") from None
-        relicensed = [path for path, reason in wrong.items() if reason == OTHER_LICENCE]
-        if relicensed:
-            logger.warning(f"other licence, will be stated without computing: {format_count(len(relicensed), 'file')}")
-        wrong = {path: reason for path, reason in wrong.items() if reason != OTHER_LICENCE}
-        if wrong:
-            first, reason = next(iter(wrong.items()))
-            others = f" and {format_count(len(wrong) - 1, 'more result')}" if len(wrong) > 1 else ""
-            logger.warning(f"outdated, to be computed again: {first} ({reason}){others}")
+        again = [path for path, reason in wrong.items() if reason != OTHER_LICENCE]
+        if relicensed := len(wrong) - len(again):
+            logger.warning(f"other licence, will be stated without computing: {format_count(relicensed, 'file')}")
+        if again:
+            others = f" and {format_count(len(again) - 1, 'more result')}" if len(again) > 1 else ""
+            logger.warning(f"outdated, to be computed again: {again[0]} ({wrong[again[0]]}){others}")
         if not self._reports and not self._other_process:
-            for path in wrong:
+            for path, reason in wrong.items():
                 with _report_unwritable(os.path.dirname(path)):
-                    os.unlink(path)
-            for path in relicensed:
-                with _report_unwritable(os.path.dirname(path)):
-                    state_licence(path, stamps[path]["license"])
+                    state_licence(path, stamps[path]["license"]) if reason == OTHER_LICENCE else os.unlink(path)
 
     def begin(self) -> None:
         """Prepare the folder before the first job starts; end if another process runs the campaign."""

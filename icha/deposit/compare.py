@@ -79,13 +79,7 @@ class Comparison(NamedTuple):
 def compare_folders(
     deposit: str | os.PathLike, rerun: str | os.PathLike, paths: Iterable[str] | None = None
 ) -> Comparison:
-    """Compare the results in two folders.
-
-    Parameters
-    ----------
-    deposit, rerun : folders of results, which contain `dataset/`, `runs/`, ….
-    paths : files to compare, relative to both folders. Default: all computed files (`COMPUTED`).
-    """
+    """Compare the results in two folders: all computed files, or only `paths`, which are relative to both folders."""
     deposit, rerun = Path(deposit), Path(rerun)
     if paths is None:
         paths = {path for folder in (deposit, rerun) for path in files_of(folder) if path.split("/")[0] in COMPUTED}
@@ -157,16 +151,10 @@ def _values(variable: netCDF4.Variable) -> np.ndarray:
 
 
 def compare_values(a: np.ndarray, b: np.ndarray, *, noise: float = 0.0) -> tuple[str, str, float] | None:
-    """Compare two arrays of the same shape and type.
+    """Compare two arrays of the same shape and type; NaN stands for a missing value.
 
-    Parameters
-    ----------
-    a, b : values in the deposit and in the rerun; NaN stands for a missing value.
-    noise : largest absolute difference that is within tolerance for values of any size.
-
-    Returns
-    -------
-    Verdict, description and largest relative deviation of the difference; None if the arrays are identical.
+    `noise` is the largest absolute difference that is within tolerance for values of any size. Return verdict,
+    description and largest relative deviation; None if the arrays are identical.
     """
     is_number = a.dtype.kind == "f"
     unequal = np.isnan(a) != np.isnan(b) if is_number else np.asarray(a != b)

@@ -53,13 +53,10 @@ def make_deposit(
     results : folder of results of the campaign.
     files : paths of the published files in `results`: at least config.used.yaml, checks.json and the campaign dataset.
     campaign : configuration with complete metadata (`icha.configuration.publication.missing_metadata`).
-    source : source of the program.
     cost : expected time and memory for computing the campaign.
 
-    Raises
-    ------
-    ValueError
-        If some systems refuse the name of a file, or if the failed checks are not exactly the known failures.
+    Raise ValueError if some systems refuse the name of a file, or if the failed checks are not exactly the known
+    failures.
     """
     folder, archive, results = Path(folder), Path(archive), Path(results)
     files, publication = sorted(files), campaign.deposit_metadata()

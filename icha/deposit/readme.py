@@ -46,16 +46,7 @@ def readme(
     sizes: Mapping[str, int],
     cost: Cost,
 ) -> str:
-    """Return the text of README.md of a deposit.
-
-    Parameters
-    ----------
-    campaign : configuration with complete metadata.
-    revision : revision of the source of the program.
-    dataset, checks : results of the campaign.
-    sizes : size of every file in bytes, by path in the deposit.
-    cost : expected time and memory for computing the whole campaign.
-    """
+    """Return the text of README.md of a deposit; `sizes` has the size of every file in bytes, by path."""
     publication = campaign.deposit_metadata()
     tops = {path.split("/")[0] for path in sizes}
     tables = [path for path in sizes if path.startswith("figures/") and path.endswith(".csv")]

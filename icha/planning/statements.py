@@ -134,9 +134,7 @@ def statements(
     Parameters
     ----------
     models : names of the models of each study.
-    cases : the runs.
-    outside : text with the surfaces and materials whose jumps into contact are outside the verified range; "" if there
-        are none; None without adhesion.
+    outside : surfaces and materials whose jumps into contact are outside the verified range; None without adhesion.
     sticky : surfaces and materials whose attraction outweighs repulsion, from `describe_sticky`.
     loops : cells in the length of loops by boundary elements (`icha.uncertainty.grid_error.cells_of_loops`).
     """

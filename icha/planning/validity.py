@@ -58,14 +58,9 @@ _SMALLEST_TABOR = 0.84
 def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
     """Return, by name, those properties of a surface at rms slope 1 that decide whether the contact models are valid.
 
-    Random surfaces are assumed to be Gaussian and isotropic. Properties of surfaces from files are computed from
-    heights.
-
-    Returns
-    -------
-    The properties in `icha.planning.statements.VALIDATED`, and three others. `summits` is the number of summits that
-    the asperity model uses. `rms_height` is the rms height, m. `complete_contact_pressure` is the pressure of complete
-    contact, divided by E*; it is estimated for random surfaces.
+    Random surfaces are assumed to be Gaussian and isotropic; surfaces from files have the properties of their heights.
+    Beside `icha.planning.statements.VALIDATED`, these are the number of summits that the asperity model uses, the rms
+    height in m, and the pressure of complete contact divided by E*, which is estimated for random surfaces.
     """
     section = campaign.surfaces[name]
     if isinstance(section, SelfAffineSurface):

@@ -18,11 +18,8 @@ def whole_file(path: str | os.PathLike) -> Iterator[Path]:
     The folder of `path` is created if it is missing. The temporary path is unique, so two programs may write the same
     file at the same time. The content reaches the disk before the move, and the new name reaches the disk afterwards.
 
-    Raises
-    ------
-    OSError
-        If nothing can be written to the folder. Libraries for data files raise other errors, which do not mention a
-        full disk; OSError replaces these errors.
+    Raise OSError if nothing can be written to the folder. It replaces the errors of libraries for data files, which do
+    not mention a full disk.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)

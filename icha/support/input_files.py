@@ -112,13 +112,6 @@ def refuse_traps(path: str | os.PathLike) -> None:
 
     Links to other files could reach any file of this machine. A group with two names may contain itself, which crashes
     the netCDF library. Links to data in the same file are accepted. Files of other formats are not checked.
-
-    Raises
-    ------
-    RefusedFile
-        If the file is dangerous; the message contains the name of the link, group or dataset.
-    OSError
-        If the file is damaged.
     """
     import h5py
 

@@ -166,14 +166,8 @@ def numbers_of(
 ) -> list[np.ndarray]:
     """Return the numbers in some columns; raise ValueError if one is not within the bounds of `rule`.
 
-    The numbers of all these columns have the same decimal sign, a point or a comma.
-
-    Parameters
-    ----------
-    rows : rows of the table.
-    columns : name of each column for messages, by its index from 0.
-    rule : bounds of the numbers; positive by default.
-    signed : columns of finite numbers without bounds.
+    The numbers of all these columns have the same decimal sign, a point or a comma. `columns` has the name of each
+    column for messages, by its index from 0; `signed` are columns of finite numbers without bounds.
     """
     import numpy as np  # imported here because most commands read no table
 
@@ -200,17 +194,13 @@ def read_columns(
 ) -> list[np.ndarray]:
     """Read columns of positive numbers from a table with a line of headings; return one array for each column.
 
+    Raise ValueError if the file cannot be read, a column is missing, or a value is not positive or exceeds its limit.
+
     Parameters
     ----------
-    path : path of the file.
     columns : heading of each column to read, with the factor by which the numbers of this column are multiplied.
     limits : largest product in a column, and a text for messages after "is more than", by heading.
     signed : headings of columns whose numbers may be zero or negative.
-
-    Raises
-    ------
-    ValueError
-        If the file cannot be read, a column is missing, or a value is not a positive number or exceeds its limit.
     """
     headings, rows = read_table(path)
     for heading in columns:

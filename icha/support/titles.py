@@ -96,11 +96,7 @@ def contradicting_unit(title: str, unit: str, si_unit: str) -> str | None:
 def problem_with_numbers(title: str, unit: str, si_unit: str) -> str | None:
     """Return why the numbers below a title are probably not values in `unit`, and what to do; None if they may be.
 
-    Parameters
-    ----------
-    title : title of the column, without a unit that contradicts `unit`.
-    unit : unit of the numbers according to the configuration.
-    si_unit : Pa for pressures, 1 for ratios, N for forces, m for lengths.
+    The title has no unit that contradicts `unit`, the unit of the configuration; `si_unit` is Pa, 1, N or m.
     """
     if found := _LOGARITHM.search(unicodedata.normalize("NFKC", title)):
         return f"contains {found[0]!r}, so the numbers look like logarithms; expected the values themselves"

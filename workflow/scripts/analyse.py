@@ -22,13 +22,11 @@ def analyse(runs, outputs, *, stamps, compared, varied, samples, attributes, des
 
     Parameters
     ----------
-    runs : labels of each run, by path.
-    outputs : files to write, by name. Names of files that the campaign does not have are absent.
+    runs, outputs : labels of each run, by path; files to write, by name, without those that the campaign does not have.
     stamps : expected stamp of each run, in the order of `runs`.
     compared : paths of the runs with boundary elements that the asperity model is compared with.
     varied, samples : varied and sampled parameters of the studies.
-    attributes : attributes of all datasets.
-    described : further attributes of the campaign dataset.
+    attributes, described : attributes of all datasets, and further ones of the campaign dataset.
     """
     refuse_outdated(dict(zip(runs, stamps, strict=True)))
 
