@@ -1,7 +1,7 @@
 """Results of checks: a value, the limit of the value, and its meaning."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -51,26 +51,12 @@ class Check:
     invalidates: str = EVERYTHING
 
 
-@dataclass(frozen=True)
-class RunArrays:
+class RunArrays(dict[str, np.ndarray]):
     """Arrays of a run by name. Checks of a small run are much faster with NumPy arrays than with xarray."""
 
-    values: dict[str, np.ndarray]
-    sizes: dict[str, int]
-    attrs: Mapping[str, str]
-
-    def __contains__(self, name: str) -> bool:
-        """Return whether the run has a variable of this name."""
-        return name in self.values
-
-    def __getitem__(self, name: str) -> np.ndarray:
-        """Return the values of the variable of this name."""
-        return self.values[name]
-
-
-def count_not_finite(arrays: Iterable[np.ndarray]) -> int:
-    """Return the number of values in arrays that are not finite."""
-    return sum(int(np.count_nonzero(~np.isfinite(values))) for values in arrays if values.dtype.kind in "fiu")
+    def __init__(self, values: Mapping[str, np.ndarray], sizes: Mapping[str, int], attrs: Mapping[str, str]):
+        super().__init__(values)
+        self.sizes, self.attrs = sizes, attrs
 
 
 def compare_with_limit(

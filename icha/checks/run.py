@@ -13,7 +13,6 @@ from icha.checks.findings import (
     Definition,
     RunArrays,
     compare_with_limit,
-    count_not_finite,
 )
 from icha.checks.loops import EVENT_COUNTS, LOOP_CHECKS, check_loop, finite_stiffness
 from icha.contact.attraction import FINITE_RANGE, SHORT_RANGE
@@ -85,8 +84,9 @@ def check_variables(
 
 def _check(run: RunArrays) -> Iterator[tuple]:
     """Yield name, value and limit of every check of a run."""
-    values = (own[~np.isposinf(own)] if name in _MAY_BE_INFINITE else own for name, own in run.values.items())
-    yield "finite", count_not_finite(values), 0
+    numbers = {name: own for name, own in run.items() if own.dtype.kind in "fiu"}
+    values = (own[~np.isposinf(own)] if name in _MAY_BE_INFINITE else own for name, own in numbers.items())
+    yield "finite", sum(np.count_nonzero(~np.isfinite(own)) for own in values), 0
     steps = run.sizes["step"]
     yield "steps", int(steps == 0), 0
     if steps == 0:
