@@ -36,12 +36,6 @@ class Progress:
     A file counts as finished if its modification time has changed since this object was made. Files that the jobs keep
     do not count, although Snakemake changes their times.
 
-    Parameters
-    ----------
-    items : files that Snakemake may compute, with their states.
-    results : folder of the results.
-    cores : number of cores in use.
-
     Attributes
     ----------
     expected : files that must be computed.
@@ -90,9 +84,7 @@ def _time_of(path: str) -> int | None:
 def run_process(command: list[str], folder: Path, log: Path, progress: Progress, name: str) -> tuple[int, bool]:
     """Run a command and show the progress of campaign `name`; a signal to stop ends the command.
 
-    Returns
-    -------
-    The exit status, and whether a signal stopped the command.
+    Return the exit status, and whether a signal stopped the command.
     """
     with log.open("a", encoding="utf-8") as output:
         # The command gets its own process group, so that a signal reaches it and its jobs only once, from this process.

@@ -66,10 +66,7 @@ class Choice(NamedTuple):
 
 
 def choose_levels(campaign: Campaign, results: Path, cores: int) -> dict[str, Choice]:
-    """Return the choice of each study with `accuracy`, by name; the campaign dataset must exist.
-
-    A budget is a time on `cores` cores, which share the runs.
-    """
+    """Return the choice of each study with `accuracy`, by name; a budget is a time on `cores` cores."""
     studies = {name: study for name, study in campaign.studies.items() if study.accuracy is not None}
     if not studies:
         return {}

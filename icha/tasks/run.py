@@ -42,10 +42,8 @@ def compute_run(
     Parameters
     ----------
     surface : file of the surface; its heights are scaled to `rms_height`, or to `rms_slope` without an `rms_height`.
-    output : file to write.
     rms_slope, rms_height, seed, material, path, model : settings of the run, in SI units.
     attributes : attributes of the file, with the stamp (`icha.datasets.stamp`).
-    progress : function that prints a line of progress.
     resumable : if true, save checkpoints beside `output`, and resume from checkpoints with the same stamp.
     """
     folder = _checkpoints(output, attributes) if resumable else None

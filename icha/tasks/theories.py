@@ -10,12 +10,8 @@ from icha.surfaces.spectrum import SelfAffineSpectrum
 def make_theories(surface, output, *, settings, adhesive, attributes):
     """Write the references for a surface: predictions of theories, and published data points.
 
-    Theories of separate summits are omitted if they do not apply to the surface or the materials.
-
-    Parameters
-    ----------
-    surface, output : surface file to read, and file to write.
-    settings, adhesive : the surface; rms slopes and materials of the contacts with adhesion; in SI units.
+    Theories of separate summits are omitted if they do not apply to the surface or the materials. `adhesive` has rms
+    slopes and materials of the contacts with adhesion. Settings are in SI units.
     """
     keys = ("period", "rolloff_wavelength", "short_wavelength", "hurst")
     known = settings["kind"] == "self_affine"

@@ -45,10 +45,8 @@ def compute_batch(outputs, arguments, task, program, licence):
 
     Parameters
     ----------
-    outputs : paths of the files.
     arguments : keyword arguments of the task for each file; the argument `attributes` contains the stamp.
-    task : function that computes one file; its argument `output` is the path of the file.
-    program : function that returns the fingerprint of the program from the arguments of a file.
+    task, program : functions that compute a file, and that return the fingerprint of the program from its arguments.
     licence : licence that the files state; it is no parameter of the job, because a new licence computes no file again.
     """
     if any(program(each) != each["attributes"]["program_sha256"] for each in arguments):

@@ -9,10 +9,7 @@ from icha.support.checksums import refuse_changed
 
 
 def write_configuration(output, *, text, copies, sha256):
-    """Write the configuration and copy its input files.
-
-    copies : source file of each copy. sha256 : expected checksums of the source files, in the order of `copies`.
-    """
+    """Write the configuration and copy its input files; `copies` has the source of each copy, `sha256` its checksum."""
     for (copy, file), expected in zip(copies.items(), sha256, strict=True):
         with whole_file(copy) as temporary:
             shutil.copyfile(file, temporary)
