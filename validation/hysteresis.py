@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from icha.configuration.load import load_configuration
-from icha.contact.models import DEFAULT_MODEL
+from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
 from icha.datasets.files import read_campaign
 from validation.tables import Table, copy_figures, means, write_tables
 
@@ -79,6 +79,18 @@ def controls(separation: xr.Dataset, load: xr.Dataset) -> Table:
     return Table([*head, "loss/Δγ: separation", "load"], rows)
 
 
+def models(study: xr.Dataset) -> Table:
+    """Table of area, pull-off and loss of both models, means ± standard deviations over the seeds."""
+    truth, rows = study.sel(model=REFERENCE_MODEL).isel(surface=0), []
+    for slope, energy, one in _adhesive_runs(study):
+        exact = truth.sel(rms_slope=slope, material=one["material"])
+        for name, words in (_WORDS | {_AREA: "A/A₀ at the largest load"}).items():
+            both = [each[name].values for each in (exact, one)]
+            error = 100 * (both[1].mean() / both[0].mean() - 1)
+            rows.append([f"{slope:g}", energy, words, *(_mean(each, _FORMS[name]) for each in both), f"{error:+.0f}"])
+    return Table(["h′rms", "Δγ, mJ/m²", "", "boundary elements", "asperities", "asperities, %"], rows)
+
+
 def main() -> None:
     """Write the tables, and copy the figures of the page, from the results of the campaign."""
     campaign = load_configuration(Path("config/campaigns/hysteresis.yaml")).campaign
@@ -91,6 +103,7 @@ def main() -> None:
             "hysteresis_largest_loads": largest_loads(
                 [studies[name] for name in campaign.figures.fig14_pull_off.load_studies]
             ),
+            "hysteresis_models": models(studies["truth"]),
             "hysteresis_load_control": controls(studies["slopes"], studies["load_control"]),
         }
     )
