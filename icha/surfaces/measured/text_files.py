@@ -69,6 +69,10 @@ _REMARKS = re.compile(
     r"\b(?:date|time|datum|uhrzeit|heure|version|serial|operator|user|file|name|comment|title|id|no|nr|number"
     r"|temperature|channel|[ip] gain|rate|speed|samples|average|zoom)\b"
 )
+# Meanings of lines with lengths along the surface, and the largest unit of heights, m.
+_LATERAL, _COARSEST = ("size", "pixel", "width", "height", "dx", "dy", "distance of points"), 1e-3
+# Words about points that were left out or united.
+_THINNED = re.compile(r"binning|decimat|every \S*\d|sub-?sampl", re.IGNORECASE)
 # A number alone, or a number and a unit of length.
 _VALUE = re.compile(rf"{_NUMBER}\s*(\S*)")
 _MEANINGS = {name: meaning for meaning, names in _NAMES.items() for name in names.split("|")}
@@ -271,19 +275,24 @@ class _Heading:
         """Raise UnfitTopography if a heading of no known format has a line that may change what it states for a key.
 
         Such lines state a number alone or a length under a name that ICHA does not know, such as a line spacing,
-        binning or factor of the heights.
+        binning or factor of the heights, or that points were left out.
         """
         for name, value, line in () if self.is_known else self.entries:
             found = _VALUE.match(value)
             known = name in (*_NAMES, "dx", "dy", "distance of points") or _REMARKS.search(name)
-            if not found or known or re.fullmatch(r"1(?:[.,]0*)?", value):
+            if known or re.fullmatch(r"1(?:[.,]0*)?(?:\s*[x×*]\s*1)?", value):
                 continue
-            if not found[2] or metres_of(found[2]) or found[2] in ("x", "X", "×", "*"):
-                raise UnfitTopography(
-                    f"is missing; the heading states {stated!r}, but also {line.strip()[:60]!r}, which may change it. "
-                    "Give the value for the table of numbers in this key",
-                    key,
-                )
+            number = found and (not found[2] or metres_of(found[2]) or found[2][0] in "xX×*")
+            if number or _THINNED.search(line):
+                self._ask(key, stated, line)
+
+    def _ask(self, key, stated, line):
+        """Raise UnfitTopography because a line of the heading may change what the heading states for a key."""
+        raise UnfitTopography(
+            f"is missing; the heading states {stated!r}, but also {line.strip()[:60]!r}, which may change it. "
+            "Give the value for the table of numbers in this key",
+            key,
+        )
 
     def agrees_with(self, shape: tuple[int, int]) -> bool:
         """Return whether the heading states the rows and columns of a table; raise an error if it states others."""
@@ -312,9 +321,17 @@ class _Heading:
 
     def find_height_unit(self, settings: Preparation) -> float | None:
         """Return the unit of the heights, m; None without a unit."""
-        texts = self.values("value units", "unit of heights") or self.values("unit")
-        if texts and settings.height_unit is None:
-            self.ask_about_unread_line("height_unit", texts[0])
+        texts = self.values("value units", "unit of heights")
+        general = [] if texts else self.values("unit")
+        if (texts or general) and settings.height_unit is None:
+            self.ask_about_unread_line("height_unit", (texts or general)[0])
+            # A unit without a name is that of the heights only if no line but those of lengths states another one.
+            lateral = [line for name, value, line in self.entries if name in _LATERAL and re.search(r"\d", value)]
+            for line in () if self.is_known or not general else self.lines:
+                units = {metres_of(word) for word in re.findall(r"[^\W\d_]+", line)} - {None, metres_of(general[0])}
+                if line not in lateral and any(unit <= _COARSEST for unit in units):
+                    self._ask("height_unit", general[0], line)
+        texts = texts or general
         return _agreed("height_unit", texts, settings.height_unit)
 
     def find_lateral_unit(self, settings: Preparation) -> float | None:
