@@ -32,6 +32,11 @@ def event_error(du, pressure_jump):
     return 0.5 * abs(du * pressure_jump)
 
 
+# If the loss of a step exceeds this fraction of its work, jumps cause the loss. Below this fraction it may be an error:
+# in the asperity model, the interaction of spots of different size is not exactly reciprocal.
+_CERTAIN_LOSS = 0.1
+
+
 def _extrapolate_to_full_contact(du, p, q, slope, end_slope):
     """Return finite pressures and slopes at both ends of a step from or to full contact, and the error of the work.
 
@@ -143,16 +148,18 @@ class EnergyBalance:
     def add_step(self, contact: ContactModel, step: Step) -> EnergyBalance:
         """Return the balance after one more step.
 
-        1. Jumps cause the whole loss if the step has no coalescence and no split, and if the reference losses of the
-           jumps into and out of contact have the same sign. The jumps share the loss in proportion to these losses.
+        1. Jumps cause the whole loss if the step has no coalescence and no split, if the reference losses of the jumps
+           into and out of contact have the same sign, and if the loss is within a factor of two of their sum or more
+           than a tenth of the work. The jumps share the loss in proportion to their reference losses.
         2. In all other cases, each jump causes its reference loss. The rest of the loss is attributed to
            coalescence if the step has a coalescence or split; otherwise it is unattributed.
         """
         energy, kinds, united = step.events.energy, step.events.kind, step.unites_or_splits
         jump_in, jump_off = (float(energy[kinds == kind].sum()) / contact.area for kind in (JUMP_IN, JUMP_OFF))
-        if not united and jump_in + jump_off and jump_in * jump_off >= 0:
-            scale = step.loss / (jump_in + jump_off)
-            jump_in, jump_off = scale * jump_in, scale * jump_off
+        ratio = step.loss / ((jump_in + jump_off) or np.inf)
+        certain = 0.5 < ratio < 2 or abs(step.loss) > _CERTAIN_LOSS * abs(step.work)
+        if certain and ratio and not united and jump_in * jump_off >= 0:
+            jump_in, jump_off = ratio * jump_in, ratio * jump_off
         rest = step.loss - jump_in - jump_off
         return replace(
             self,
