@@ -328,8 +328,9 @@ class _Heading:
             # A unit without a name is that of the heights only if no line but those of lengths states another one.
             lateral = [line for name, value, line in self.entries if name in _LATERAL and re.search(r"\d", value)]
             for line in () if self.is_known or not general else self.lines:
-                units = {metres_of(word) for word in re.findall(r"[^\W\d_]+", line)} - {None, metres_of(general[0])}
-                if line not in lateral and any(unit <= _COARSEST for unit in units):
+                found = map(metres_of, re.findall(r"[^\W\d_]+", line))
+                units = {unit for unit in found if unit and unit <= _COARSEST and unit != metres_of(general[0])}
+                if units and line not in lateral:
                     self._ask("height_unit", general[0], line)
         texts = texts or general
         return _agreed("height_unit", texts, settings.height_unit)
