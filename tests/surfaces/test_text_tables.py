@@ -194,6 +194,8 @@ def test_factors_of_heights_in_headings_are_asked_about(tmp_path, entry):
         "Profile spacing: 1 um",
         "Pixel aspect ratio: 2",
         "Binning: 2",
+        "Binning: 2x2",
+        "Decimation: every 2nd point",
         "Z increment: 0.1 nm",
         "Conversion: 0.1",
         "Values x 10",
@@ -207,6 +209,15 @@ def test_lines_that_may_change_size_and_heights_are_asked_about(tmp_path, line):
     with refused("height_unit", f"also {re.escape(repr(line))}, which may change it|may be a factor"):
         read(path, height_unit=None)
     assert_heights(read(path))
+
+
+@pytest.mark.parametrize("line", ["Unit Z: nm", "Height [nm]", "The heights are in nm."])
+def test_a_unit_without_a_name_may_be_that_of_lengths(tmp_path, line):
+    heading = ["Scan size: 12 um x 12 um", "Unit: um"]
+    with refused("height_unit", f"also {re.escape(repr(line))}, which may change it"):
+        read(written(tmp_path, text(rows(), " ", [*heading, line])), height_unit=None)
+    alone = read(written(tmp_path, text(rows(), " ", ["Scan size: 12 um x 12 um", "Unit: nm"])), height_unit=None)
+    assert_heights(alone)
 
 
 def test_a_size_with_three_digits_behind_a_comma_is_ambiguous(tmp_path):
