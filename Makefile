@@ -21,7 +21,7 @@ help:
 	@echo "make run            run the campaign of config/config.yaml, or of CONFIG=FILE, on $(CORES) cores"
 	@echo "make publish        run that campaign and make its deposit; see docs/howto/publish.md"
 	@echo "make validation     run the campaign validation (two hours) and write the tables and figures of docs/validation.md"
-	@echo "make hysteresis     run the campaign hysteresis (forty minutes) and write the tables and figures of docs/hysteresis.md"
+	@echo "make hysteresis     run the campaign hysteresis (a quarter of an hour) and write the tables and figures of docs/hysteresis.md"
 	@echo "make tamaas         install Tamaas, an independent code, for comparisons in validation and tests"
 	@echo "make test           run the quick tests (three minutes): physics, every rule, wrong input"
 	@echo "make test-all       run all tests: more random cases, kills, resumption, Slurm, a browser, deposits"
