@@ -9,7 +9,8 @@ import icha
 from icha import Material, Path, Surface, simulate
 from icha.boundary_elements.contact import BoundaryElements
 from icha.checks.run import check_run
-from icha.contact.models import AREA_TOLERANCE_CELLS, MODELS, REFERENCE_MODEL
+from icha.contact.models import AREA_TOLERANCE_CELLS, REFERENCE_MODEL
+from icha.path import step_accuracy
 from validation.rough_contacts import (
     HARD,
     SOFT,
@@ -75,9 +76,10 @@ def test_loss_of_a_loop_with_adhesion_hardly_depends_on_the_step():
 def test_losses_by_each_kind_of_event_hardly_depend_on_the_accuracy_of_the_work(monkeypatch):
     """The energies that lone patches would release are twice the losses, if the steps are long."""
     surface, material = rough(64, 8), dataclasses.replace(SOFT, surface_energy=4 * SOFT.surface_energy)
-    coarse, model = loop(surface, 1e-2, 0.2, material), MODELS[REFERENCE_MODEL]
-    accuracy = dataclasses.replace(model.accuracy, loss=1e-6)
-    monkeypatch.setitem(MODELS, REFERENCE_MODEL, dataclasses.replace(model, accuracy=accuracy))
+    coarse = loop(surface, 1e-2, 0.2, material)
+    accuracy = dataclasses.replace(BoundaryElements.path_accuracy, work=1e-6)
+    monkeypatch.setattr(BoundaryElements, "path_accuracy", accuracy)
+    monkeypatch.setattr(step_accuracy, "ERROR_OVER_RELEASED", 0.01 * step_accuracy.ERROR_OVER_RELEASED)
     fine = loop(surface, 1e-2, 0.2, material)
     assert fine["steps"] > 2 * coarse["steps"] and fine["jump_in"] > 4e-4 * fine["largest_work"]
     for part in ("work", "jump_in", "jump_off", "coalescence", "unattributed"):
