@@ -37,7 +37,7 @@ def fit_work_of_adhesion(force: np.ndarray, contact_radius: np.ndarray, radius: 
         work = scale * np.asarray(root)[..., None] ** 2
         unit = 3 * math.pi * work * radius
         cube = 0.75 * radius / contact_modulus * (force + unit + np.sqrt(np.maximum(2 * unit * force + unit**2, 0.0)))
-        return np.sum((np.cbrt(np.maximum(cube, 0.0)) ** 3 - contact_radius**3) ** 2, axis=-1)
+        return np.sum((np.maximum(cube, 0.0) - contact_radius**3) ** 2, axis=-1)
 
     # The sum has several minima: one may be where the tension of a state is the pull-off force of the law.
     best = int(np.argmin(misfit(_ROOTS)))
