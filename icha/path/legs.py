@@ -36,6 +36,8 @@ from icha.support.formatting import format_quantity
 # Distance of the last station above first contact, in h_rms, without adhesion. Exactly at first contact, a spot may
 # remain in contact because of the error of the equilibrium.
 _ABOVE_CONTACT = 1e-8
+# Shortest step after halvings of a failed step, relative to the longest step.
+_SMALLEST_STEP = 2.0**-14
 
 
 def follow_legs(
@@ -277,8 +279,9 @@ class _Legs:
 
     def _halve_failed_step(self, length, failure):
         """Let the next step be half as long as a failed step of a given length, m; raise if that is too short."""
-        half = self.progress.halve_step(length, failure, self.state, self.loading)
-        self.ahead.append((self.state.separation + self.direction * half, None))
+        if length / 2 < _SMALLEST_STEP * self.longest:
+            raise self.make_path_error(failure) from failure
+        self.ahead.append((self.state.separation + self.direction * length / 2, None))
 
     def _find_equilibrium(self, separation, length):
         """Find the equilibrium at a separation, m, at the end of a step of a given length, m.

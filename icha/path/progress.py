@@ -16,8 +16,6 @@ from icha.path.stops import (
 )
 from icha.path.targets import Target
 
-# Shortest step after halvings, relative to the longest step.
-_SMALLEST_STEP = 2.0**-14
 # Largest number of equilibria in which no target is met and the separation changes by less than the longest step.
 _MOST_EQUILIBRIA = 2000
 
@@ -108,12 +106,6 @@ class PathProgress:
         if target is None and contact.largest_area_fraction < 1 and contact.mean_gap(after) <= 0:
             reason = f"the mean planes meet before {name}, outside the range of the model"
             raise self.make_path_error(after, loading, BeyondModel(reason))
-
-    def halve_step(self, step: float, failure: NotConverged, state: State, loading: bool) -> float:
-        """Return half the length, m, of a step without an equilibrium; raise `NotConverged` if that is too short."""
-        if step / 2 < _SMALLEST_STEP * self.longest:
-            raise self.make_path_error(state, loading, failure) from failure
-        return step / 2
 
     def make_path_error(self, state: State, loading: bool, *failures: NotConverged) -> NotConverged:
         """Return the exception for a path that cannot continue after a state.
