@@ -325,15 +325,20 @@ class _Heading:
         general = [] if texts else self.values("unit")
         if (texts or general) and settings.height_unit is None:
             self.ask_about_unread_line("height_unit", (texts or general)[0])
-            # A unit without a name is that of the heights only if no line but those of lengths states another one.
-            lateral = [line for name, value, line in self.entries if name in _LATERAL and re.search(r"\d", value)]
-            for line in () if self.is_known or not general else self.lines:
-                found = map(metres_of, re.findall(r"[^\W\d_]+", line))
-                units = {unit for unit in found if unit and unit <= _COARSEST and unit != metres_of(general[0])}
-                if units and line not in lateral:
-                    self._ask("height_unit", general[0], line)
-        texts = texts or general
-        return _agreed("height_unit", texts, settings.height_unit)
+            if general and not self.is_known:
+                self._ask_about_another_unit(general[0])
+        return _agreed("height_unit", texts or general, settings.height_unit)
+
+    def _ask_about_another_unit(self, general):
+        """Raise UnfitTopography if a unit without a name may not be that of the heights.
+
+        It may be that of the lengths if a line other than those of lengths states another unit.
+        """
+        lateral = [line for name, value, line in self.entries if name in _LATERAL and re.search(r"\d", value)]
+        for line in self.lines:
+            others = set(map(metres_of, re.findall(r"[^\W\d_]+", line))) - {metres_of(general)}
+            if line not in lateral and any(unit and unit <= _COARSEST for unit in others):
+                self._ask("height_unit", general, line)
 
     def find_lateral_unit(self, settings: Preparation) -> float | None:
         """Return the unit of the coordinates, m; None without a unit."""
