@@ -6,14 +6,7 @@ from collections.abc import Hashable, Iterable, Iterator, Mapping
 import numpy as np
 import xarray as xr
 
-from icha.checks.findings import (
-    EVERYTHING,
-    IDENTITY_LIMIT,
-    Check,
-    Definition,
-    RunArrays,
-    compare_with_limit,
-)
+from icha.checks.findings import EVERYTHING, IDENTITY_LIMIT, Check, Definition, RunArrays, compare_with_limit
 from icha.checks.loops import EVENT_COUNTS, LOOP_CHECKS, check_loop, finite_stiffness
 from icha.contact.attraction import FINITE_RANGE, SHORT_RANGE
 from icha.contact.models import AREA_TOLERANCE_CELLS, AREA_TOLERANCE_PART, SMALLEST_LOAD, model_of

@@ -16,13 +16,7 @@ from icha.configuration.publication import Publication
 from icha.contact.models import MODEL_PAPER
 from icha.datasets.campaign import run_place, runs_of_status
 from icha.datasets.labels import LABELS, slopes_of
-from icha.datasets.variables.campaign import (
-    BEYOND_MODEL,
-    FAILED_RUNS,
-    LOADED_RUNS,
-    NOT_IN_DESIGN,
-    STATUS_MEANINGS,
-)
+from icha.datasets.variables.campaign import BEYOND_MODEL, FAILED_RUNS, LOADED_RUNS, NOT_IN_DESIGN, STATUS_MEANINGS
 from icha.deposit.metadata import TABLES, acknowledgement, licence_address, paragraphs, web_address
 from icha.deposit.verify import COMPUTED
 from icha.planning.costs import Cost

@@ -20,12 +20,7 @@ from icha.contact.models import MODELS, REFERENCE_MODEL
 from icha.datasets.campaign import find_snapshot
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import LOSS_PARTS, label_of
-from icha.figures.captions import (
-    attractions_of,
-    grid_of_loops,
-    only_spheres,
-    range_of_attraction,
-)
+from icha.figures.captions import attractions_of, grid_of_loops, only_spheres, range_of_attraction
 from icha.figures.curves import drop_rounding_errors, gap_name
 from icha.figures.drawn import Name, plot, record, say
 from icha.figures.ensembles import Points

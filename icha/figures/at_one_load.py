@@ -15,14 +15,7 @@ from icha.figures.captions import about_boundary_elements, theories_of_flat_surf
 from icha.figures.curves import drop_rounding_errors
 from icha.figures.drawn import plot, say
 from icha.figures.ensembles import draw_members, join_bins
-from icha.figures.looks import (
-    MODEL_MARKERS,
-    REFERENCE_NAME,
-    TRUTH_LINE,
-    Looks,
-    legend_below,
-    model_handle,
-)
+from icha.figures.looks import MODEL_MARKERS, REFERENCE_NAME, TRUTH_LINE, Looks, legend_below, model_handle
 from icha.figures.select import NothingToDraw, has_layer, has_shape, select_snapshots, snapshot_label
 from icha.figures.style import BLACK, GREY, TWO_COLUMNS, in_style, logarithmic_axes, new_panels, slope_label
 from icha.references.persson import persson_pressure_density

@@ -15,13 +15,7 @@ from icha.figures import select
 from icha.figures.captions import about_boundary_elements
 from icha.figures.drawn import Name, plot, record, say
 from icha.figures.ensembles import draw_members, draw_points, mark_fewer
-from icha.figures.looks import (
-    ASPERITIES_NAME,
-    BRANCH_DASHES,
-    MODEL_MARKERS,
-    Looks,
-    model_handle,
-)
+from icha.figures.looks import ASPERITIES_NAME, BRANCH_DASHES, MODEL_MARKERS, Looks, model_handle
 from icha.figures.style import GREY, legend_handle, logarithmic_axes
 from icha.support.formatting import choose_unit
 

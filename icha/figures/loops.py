@@ -14,34 +14,12 @@ from icha.contact.model import EVENT_KINDS
 from icha.contact.models import MODELS, REFERENCE_MODEL
 from icha.datasets.quantities import label_of, symbol_of
 from icha.figures import select
-from icha.figures.captions import (
-    attractions_of,
-    grid_of_loops,
-    only_spheres,
-    range_of_attraction,
-)
+from icha.figures.captions import attractions_of, grid_of_loops, only_spheres, range_of_attraction
 from icha.figures.curves import Panel, panel_in_units
 from icha.figures.drawn import Name, plot, record, say
 from icha.figures.indenter_curves import read_measured, select_series, theory_curves
-from icha.figures.looks import (
-    BRANCH_DASHES,
-    MODEL_MARKERS,
-    UNLOADING_MARKERS,
-    Looks,
-    legend_below,
-    pale,
-    surface_label,
-)
-from icha.figures.style import (
-    BLACK,
-    GREY,
-    format_number,
-    in_style,
-    legend_handle,
-    new_grid,
-    new_panels,
-    slope_label,
-)
+from icha.figures.looks import BRANCH_DASHES, MODEL_MARKERS, UNLOADING_MARKERS, Looks, legend_below, pale, surface_label
+from icha.figures.style import BLACK, GREY, format_number, in_style, legend_handle, new_grid, new_panels, slope_label
 from icha.references.indenter_runs import BRANCHES, reason_without_fit, spaced_states, steps_of
 from icha.support.formatting import choose_unit, format_quantity
 

@@ -9,14 +9,7 @@ import xarray as xr
 from icha.analysis.model_error import snapshot_if_any
 from icha.contact.attraction import FINITE_RANGE
 from icha.contact.models import MODELS, REFERENCE_MODEL, first_model, model_of
-from icha.datasets.campaign import (
-    find_snapshot,
-    loading_stops,
-    reduced_gap,
-    run_place,
-    runs_of_status,
-    select_run,
-)
+from icha.datasets.campaign import find_snapshot, loading_stops, reduced_gap, run_place, runs_of_status, select_run
 from icha.datasets.labels import LABELS, RunLabels, place_of
 from icha.datasets.quantities import quantity
 from icha.datasets.variables.campaign import COMPUTED_RUNS, LOADED_RUNS, MISSING, RAGGED, WHOLE_RUNS

@@ -6,12 +6,7 @@ import pytest
 import small_campaign as small
 
 import icha
-from icha.analysis.checks import (
-    check_campaign,
-    read_checks,
-    refuse_unknown_failures,
-    write_checks,
-)
+from icha.analysis.checks import check_campaign, read_checks, refuse_unknown_failures, write_checks
 from icha.checks.findings import Check
 from icha.checks.run import check_run
 from icha.datasets.campaign import run_labels

@@ -10,14 +10,7 @@ from icha.cli import app
 from icha.datasets.campaign import run_labels, select_run
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import read_campaign, write_dataset
-from icha.datasets.labels import (
-    LABELS,
-    arrange_slopes,
-    labels_at,
-    place_of,
-    slopes_of,
-    surfaces_and_slopes,
-)
+from icha.datasets.labels import LABELS, arrange_slopes, labels_at, place_of, slopes_of, surfaces_and_slopes
 from icha.figures import against_load, at_one_load, contact_maps
 from icha.figures import errors as figures_of_errors
 

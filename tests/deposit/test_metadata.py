@@ -14,13 +14,7 @@ from publications import ALL, COMMIT, LEAST, ORCID, PUBLICATIONS
 from icha.configuration.publication import RESOURCES
 from icha.contact.models import DEFAULT_MODEL, MODEL_PAPER, MODELS
 from icha.deposit.crate import write_crate
-from icha.deposit.metadata import (
-    TABLES,
-    citation_cff,
-    licence_problem,
-    read_zenodo_metadata,
-    zenodo_metadata,
-)
+from icha.deposit.metadata import TABLES, citation_cff, licence_problem, read_zenodo_metadata, zenodo_metadata
 from icha.deposit.verify import CRATE, files_of
 
 

@@ -20,9 +20,7 @@ from icha.figures.drawn import caption_of
 from icha.figures.looks import material_colours
 from icha.figures.maps import average_blocks, wrap_circles
 from icha.figures.select import NothingToDraw, branches, path_steps, select_runs
-from icha.figures.style import (
-    save,
-)
+from icha.figures.style import save
 from icha.references.persson import persson_pressure_density
 from icha.references.theories import reference_dataset
 from icha.surfaces.moments import spectral_moments
