@@ -1,9 +1,7 @@
-"""Figures of results against a parameter: Tabor parameter (9), slope and load (14), area (15), roughness (19)."""
+"""Figures of results against a parameter: Tabor parameter (9), slope and load (14), area (15)."""
 
 import itertools
-import os
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
@@ -20,18 +18,16 @@ from icha.contact.models import MODELS, REFERENCE_MODEL
 from icha.datasets.campaign import find_snapshot
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import LOSS_PARTS, label_of
-from icha.figures.captions import attractions_of, grid_of_loops, only_spheres, range_of_attraction
+from icha.figures.captions import attractions_of, grid_of_loops, range_of_attraction
 from icha.figures.curves import drop_rounding_errors, gap_name
 from icha.figures.drawn import Name, plot, record, say
 from icha.figures.ensembles import Points
-from icha.figures.indenter_curves import CROSSES, read_measured, select_series
 from icha.figures.looks import (
     ASPERITIES_NAME,
     REFERENCE_NAME,
     TRUTH_LINE,
     UNLOADING_MARKERS,
     Looks,
-    distinct_colours,
     legend_below,
     model_handle,
 )
@@ -44,17 +40,7 @@ from icha.figures.select import (
     select_runs,
     snapshot_label,
 )
-from icha.figures.style import (
-    COLOURS,
-    GREY,
-    ONE_COLUMN,
-    TWO_COLUMNS,
-    in_style,
-    legend_handle,
-    logarithmic_axes,
-    new_figure,
-    new_panels,
-)
+from icha.figures.style import GREY, ONE_COLUMN, TWO_COLUMNS, in_style, logarithmic_axes, new_panels
 from icha.support.formatting import choose_unit
 
 # --- figure 9 ---
@@ -459,91 +445,3 @@ def _draw_parts(ax, runs, markers, looks):
     ax.tick_params("x", length=0, pad=14, labelsize=7)
     ax.set_xlabel("series of (a), at their largest load", labelpad=2)
     return shown
-
-
-# --- figure 19 ---
-
-# Name in the legend and marker of each quantity.
-_WORKS = {
-    "work_of_adhesion_approach": ("JKR fit to loading", "o"),
-    "work_of_adhesion_retraction": ("JKR fit to unloading", "s"),
-    "pull_off_force_over_jkr": ("pull-off force over that of JKR", "^"),
-}
-_UNITS_OF_WORK = {
-    "work_of_adhesion_approach": "surface_energy",
-    "work_of_adhesion_retraction": "receding_energy",
-}
-# Measured quantities, with the branch for the legend.
-_MEASURED_WORKS = {"advancing_work": "loading", "receding_work": "unloading"}
-_ONE_SEED = {"ls": "none", "ms": 3.2, "mew": 0.6, "mfc": "white"}
-_MEAN = {"lw": 0.9, "ms": 5.0}
-
-_WORK = """Apparent work of adhesion of rough spheres, divided by the work of adhesion Δγ of the material, against the
-rms height of the roughness. The theory of Johnson, Kendall and Roberts (JKR) is fitted to the first loading, and to the
-last unloading up to the largest tension. Each fit compares cubes of contact radii at given forces, with the given E*
-and R. The pull-off force of a smooth sphere by JKR is 3/2 π Δγ R. Closed markers are means over the seeds; open markers
-are the single seeds. With two works of adhesion, Δγ of loading is that of advancing edges, and Δγ of unloading and
-pull-off that of receding edges; fits to unloading then leave out states whose edge stands."""
-
-
-@in_style
-def work_of_adhesion(
-    campaign: xr.DataTree,
-    tables: Sequence[str | os.PathLike] = (),
-    *,
-    study: str,
-    measurements: Sequence[Mapping[str, Any]] = (),
-) -> Figure:
-    """Draw works of adhesion of fits and of pull-off, divided by the surface energy.
-
-    Lines join means over seeds of series that differ only in their rms height. Tables and measurements
-    (`icha.figures.indenter_curves.read_measured`) with rms heights and works of adhesion are shown too.
-    """
-    series = select_series(campaign, study, only_jkr=True)
-    if not any("pull_off_force_over_jkr" in run for each in series for run in each.runs.by_seed.values()):
-        raise NothingToDraw(f"study {study}: no sphere with adhesion was pulled off; see the surfaces and materials")
-    largest = max(float(run["rms_height"]) for each in series for run in each.runs.by_seed.values())
-    scale, unit = choose_unit(largest, "m")
-    contacts = list(dict.fromkeys(each.contact for each in series))
-    colours = dict(zip(contacts, distinct_colours(len(contacts)), strict=True))
-    fig = new_figure(1.25 * ONE_COLUMN, 2.9)
-    ax = fig.subplots()
-    say(fig, _WORK, only_spheres(campaign[study].to_dataset()))
-    handles = {name: legend_handle(color=colour, lw=4) for name, colour in colours.items() if name}
-    for (k, (quantity, (name, marker))), contact in itertools.product(enumerate(_WORKS.items()), contacts):
-        # Colours distinguish the quantities, or surfaces and materials if there are several.
-        colour, means = colours[contact] if contact else COLOURS[k], []
-        for group in (each.runs for each in series if each.contact == contact):
-            unit_of_work = _UNITS_OF_WORK.get(quantity)
-            points = {
-                seed: (
-                    float(run["rms_height"]) * scale,
-                    float(run[quantity]) / (float(run[unit_of_work]) if unit_of_work else 1.0),
-                )
-                for seed, run in group.by_seed.items()
-                if quantity in run
-            }
-            if points:
-                for seed, (x, y) in points.items():
-                    record(ax, [x], [y], Name(f"{name}, single seeds", group.labels._replace(seed=seed)))
-                ax.plot(*np.transpose([*points.values()]), marker=marker, mec=colour, **_ONE_SEED)
-                x, y = np.mean([*points.values()], axis=0)
-                record(ax, [x], [y], Name(f"{name}, mean", group.labels._replace(seed=None)), seeds=len(points))
-                means.append((x, y))
-        if means:
-            ax.plot(*np.transpose(means), marker=marker, color=colour, **_MEAN)
-            handles[name] = legend_handle(color=GREY if contact else colour, marker=marker, **_MEAN)
-    markers = itertools.cycle(CROSSES)
-    for each in read_measured(fig, tables, measurements, "rms_height", any_of=_MEASURED_WORKS):
-        for (name, branch), work in zip(_MEASURED_WORKS.items(), each.works, strict=True):
-            if name in each.values:
-                label, look = f"{each.label}, {branch}", each.look | {"marker": next(markers)}
-                plot(ax, each.values["rms_height"] * scale, each.values[name] / work, label, **look)
-                handles[label] = legend_handle(**look)
-    ax.axhline(1, color=GREY, lw=0.6, zorder=0)
-    ax.set(xlabel=f"rms height of the roughness ({unit})", ylabel=r"work of adhesion over $\Delta\gamma$")
-    ax.margins(y=0.15)
-    if not largest:
-        ax.set_xticks([0])
-    legend_below(fig, handles)
-    return fig

@@ -66,19 +66,6 @@ def theories_of_flat_surfaces(study: xr.Dataset) -> str:
     drawn."""
 
 
-def only_spheres(study: xr.Dataset) -> str:
-    """Return why fits of JKR may be missing, and which runs a figure of spheres with adhesion leaves out, if any."""
-    words = [
-        """Where a fit is missing, the Tabor parameter of the sphere is below 3, the value from which JKR holds; there
-        are fewer than three states; or the contact is so small that Hertz's law without adhesion fits better."""
-    ]
-    if "shape_radius" not in study or study["shape_radius"].isnull().any() or has_layer(study):
-        words.append("Runs on shapes without a radius, and runs on layers, are left out.")
-    if (study["surface_energy"] == 0).any():
-        words.append("Runs without adhesion are left out.")
-    return " ".join(words)
-
-
 def grid_of_loops(campaign: xr.DataTree, studies: Sequence[str]) -> str:
     """Return a sentence on the error of loops by boundary elements due to the grid; "" without such loops."""
     loops = cells_of_loops(campaign, studies)

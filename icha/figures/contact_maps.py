@@ -393,7 +393,8 @@ def pressure_maps(campaign: xr.DataTree, maps: xr.Dataset, *, run: Sequence) -> 
     )
     length, length_unit = choose_unit(float(maps["period"]), "m")
     side = float(maps["period"]) * length
-    fig, panels, columns = new_grid(len(shown), 3, 2.7, 2.15, room=(0.65, 0.1), sharex=True, sharey=True)
+    labels_of_axes = {f"{axis}label": f"${axis}$ ({length_unit})" for axis in "xy"}
+    fig, panels = new_grid(len(shown), 3, 2.7, 2.15, room=(0.65, 0.1), **labels_of_axes, sharex=True, sharey=True)
     free = str(maps["boundary"].values) == "free"
     say(fig, _PRESSURES)
     window = _touched_region(touching.any(axis=0), free)
@@ -412,10 +413,6 @@ def pressure_maps(campaign: xr.DataTree, maps: xr.Dataset, *, run: Sequence) -> 
         ax.set(xlim=np.array(window) * side, ylim=np.array(window) * side)
         ax.set_facecolor("0.8")
         _record_pressures(ax, cells / factor, side, Name(_branch(maps, k), labels))
-    for ax in panels[-columns:]:
-        ax.set_xlabel(f"$x$ ({length_unit})")
-    for ax in panels[::columns]:
-        ax.set_ylabel(f"$y$ ({length_unit})")
     bar = fig.colorbar(image, ax=panels, shrink=0.9, pad=0.015, aspect=28, extend="both")
     bar.set_label(f"pressure ({unit})")
     ends = (-least, -least / 2, 0, most / 2, most)

@@ -240,8 +240,8 @@ def _draw_line(axes, line, panel, count):
             say(axes, _COMMON)
             return np.tile(load, len(drawn)), drawn.ravel()
     # A single run, or several runs without a mean, because these runs have no load in common.
-    for (load, values), name in zip(members, line.runs.names_of_seeds.values(), strict=True):
-        plot(axes, load, values, name, **line.look)
+    for (load, values), (labels, _) in zip(members, line.runs.members, strict=True):
+        plot(axes, load, values, Name(line.runs.model_name, labels), **line.look)
         if len(members) < asked:
             mark_fewer(axes, load, values, np.isfinite(values)[None], line.look, asked)
     return tuple(map(np.concatenate, zip(*members, strict=True)))
@@ -257,12 +257,11 @@ def _draw_crosses(axes, line, panel):
 
 def _draw_unloading(axes, line, panel):
     """For every run of a line, draw the unloading at compressive loads; the limits of the axes do not change."""
-    names = line.runs.names_of_seeds
-    for name, leg in [(names[k], leg) for k, run in line.runs.by_seed.items() for leg in select.unloading_legs(run)]:
+    for labels, leg in [(labels, leg) for labels, run in line.runs.members for leg in select.unloading_legs(run)]:
         load, values = panel.points(leg)
         pressed = load > _LEAST_LOAD * np.max(load, initial=0.0)
         load, values = load[pressed], values[pressed]
-        record(axes, load, values, name._replace(curve=f"{name.curve}, unloading"))
+        record(axes, load, values, Name(f"{line.runs.model_name}, unloading", labels))
         # Loads just before separation are arbitrarily small, so the line must not affect the limits of the axes.
         axes.add_artist(legend_handle(load, values, color=line.look["mec"], **_UNLOADING))
         axes.plot([], [], color=GREY, label="unloading", **_UNLOADING)

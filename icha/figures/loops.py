@@ -1,8 +1,4 @@
-"""Figures of loading and unloading: loops of rough contact (13), force of indenters (17), straight line of JKR (18)."""
-
-import os
-from collections.abc import Mapping, Sequence
-from typing import Any
+"""Figure of loading and unloading of rough contact (13)."""
 
 import numpy as np
 import xarray as xr
@@ -12,18 +8,13 @@ from matplotlib.ticker import MaxNLocator
 from icha.analysis.model_error import difference_of_contacts
 from icha.contact.model import EVENT_KINDS
 from icha.contact.models import MODELS, REFERENCE_MODEL
-from icha.datasets.quantities import label_of, symbol_of
+from icha.datasets.quantities import symbol_of
 from icha.figures import select
-from icha.figures.captions import attractions_of, grid_of_loops, only_spheres, range_of_attraction
+from icha.figures.captions import attractions_of, grid_of_loops, range_of_attraction
 from icha.figures.curves import Panel, panel_in_units
 from icha.figures.drawn import Name, plot, record, say
-from icha.figures.indenter_curves import read_measured, select_series, theory_curves
 from icha.figures.looks import BRANCH_DASHES, MODEL_MARKERS, UNLOADING_MARKERS, Looks, legend_below, pale, surface_label
-from icha.figures.style import BLACK, GREY, format_number, in_style, legend_handle, new_grid, new_panels, slope_label
-from icha.references.indenter_runs import BRANCHES, reason_without_fit, spaced_states, steps_of
-from icha.support.formatting import choose_unit, format_quantity
-
-# --- figure 13 ---
+from icha.figures.style import GREY, format_number, in_style, legend_handle, limits_around, new_panels, slope_label
 
 # All slopes share a panel if there are at most this number of loops.
 _MOST_LOOPS = 4
@@ -180,17 +171,7 @@ def _small_tensions(drawn, panel):
         at = np.flatnonzero(near)
         # The first state after separation is shown as well.
         shown.append(separation[np.unique([*at, min(at[-1] + 1, len(near) - 1)])] if at.size else [])
-    return _limits(np.concatenate(shown)), (-_REACH * tension, _REACH * tension)
-
-
-# Space around the states of the runs, divided by their range.
-_MARGIN = 0.06
-
-
-def _limits(values):
-    """Return the limits of an axis around some values."""
-    room = _MARGIN * np.ptp(values)
-    return float(values.min() - room), float(values.max() + room)
+    return limits_around(np.concatenate(shown)), (-_REACH * tension, _REACH * tension)
 
 
 def _handles(looks, loops, *, marked):
@@ -204,169 +185,3 @@ def _handles(looks, loops, *, marked):
         for branch, markers in _TRUTH_MARKERS.items():
             handles[f"{name}, {branch}"] = legend_handle(color=GREY, marker=markers[name], **_TRUTH)
     return handles
-
-
-# --- figure 17 ---
-
-# Largest number of series in a panel.
-_MOST_SERIES = 3
-_LOOP = {"lw": 0.9, "alpha": 0.85}
-_THEORIES = {
-    "JKR": {"color": GREY, "lw": 2.4, "alpha": 0.45},
-    "JKR, receding": {"color": GREY, "lw": 2.4, "alpha": 0.25},
-    "Hertz": {"color": GREY, "lw": 0.9, "ls": ":"},
-}
-_INDENTATION = """Force against indentation. The indentation is the distance by which the apex of the shape without
-roughness has moved beyond the undeformed plane of the elastic body. Tension is negative. Every seed is a line of its
-own."""
-_SPHERES = """The theories of Hertz, and of Johnson, Kendall and Roberts (JKR), are for a smooth sphere with the radius,
-the modulus and the works of adhesion of the runs in the same panel. The line of JKR includes states that are unstable
-under load control, up to the jump-off under displacement control. Runs without adhesion have no line of JKR; shapes
-without a radius and layers have no line."""
-
-
-@in_style
-def force_indentation(
-    campaign: xr.DataTree,
-    tables: Sequence[str | os.PathLike] = (),
-    *,
-    study: str,
-    measurements: Sequence[Mapping[str, Any]] = (),
-) -> Figure:
-    """Draw force against indentation for all runs of a study, with the theories for each radius and material.
-
-    Series have a panel each if they are many, or if they differ in more than the rms height. Tables and measurements
-    (`icha.figures.indenter_curves.read_measured`) with forces and indentations are shown too.
-    """
-    series = select_series(campaign, study)
-    runs = [run for each in series for run in each.runs.by_seed.values()]
-    names = "indentation", "force"
-    panel = panel_in_units(*names, *runs)
-    limits = [_limits(values) for values in map(np.concatenate, zip(*map(panel.points, runs), strict=True))]
-    together = len(series) <= _MOST_SERIES and not any(each.contact for each in series)
-    shown = [series] if together else [[each] for each in series]
-    fig, panels, columns = new_grid(len(shown), 2, 2.7, 3.55, least=1.3, sharex=True, sharey=True)
-    say(fig, _INDENTATION)
-    measured = read_measured(fig, tables, measurements, *names)
-    points = [(panel.points(each.values), each) for each in measured]
-    for axis, ends in enumerate(limits):
-        drawn = np.concatenate([ends, *(values[axis] for values, _ in points)])
-        limits[axis] = _limits(drawn) if points else ends
-    largest = max(float(run["contact_radius"].max()) for run in runs)
-    theories = {}
-    for ax, of_panel in zip(panels, shown, strict=True):
-        of_sphere = theory_curves(of_panel[0].first_run, 1.5 * largest)
-        theories |= of_sphere
-        for name, states in of_sphere.items():
-            plot(ax, *panel.points(dict(zip(names, states, strict=True))), name, zorder=1, **_THEORIES[name])
-        for each in of_panel:
-            for seed, run in each.runs.by_seed.items():
-                for branch, leg in select.branches(run):
-                    name = Name(branch, each.runs.labels._replace(seed=seed))
-                    plot(ax, *panel.points(leg), name, color=each.colour, ls=BRANCH_DASHES[branch], **_LOOP)
-        for values, each in points:
-            if each.material in (None, *(one.runs.labels.material for one in of_panel)):
-                plot(ax, *values, each.label, **each.look)
-        ax.axhline(0, color=GREY, lw=0.5, zorder=0)
-        if len(shown) > 1:
-            ax.set_title(of_panel[0].name, loc="right")
-        ax.set(xlim=limits[0], ylim=limits[1])
-    for ax in panels[-columns:]:
-        ax.set_xlabel(label_of(panel.x, panel.units[0]))
-    for ax in panels[::columns]:
-        ax.set_ylabel(label_of(panel.y, panel.units[1]))
-    say(fig, _SPHERES if theories else "")
-    named = [] if len(shown) > 1 else series
-    handles = {each.name: legend_handle(color=each.colour, **_LOOP) for each in named}
-    handles |= {name: legend_handle(color=BLACK, ls=dashes, **_LOOP) for name, dashes in BRANCH_DASHES.items()}
-    handles |= {f"{name}, smooth sphere": legend_handle(**_THEORIES[name]) for name in theories}
-    handles |= {each.label: legend_handle(**each.look) for each in measured}
-    legend_below(fig, handles)
-    return fig
-
-
-# --- figure 18 ---
-
-# Variables of the works of adhesion; title of the panel and marker of the states.
-_TITLES = {"approach": ("loading", "o"), "retraction": ("unloading", "s")}
-_STATES = {"ls": "none", "ms": 2.8, "mew": 0.6, "mfc": "white"}
-_FIT = {"lw": 0.9, "ls": "-"}
-
-_LINE = """Linearised plot of the equation of Johnson, Kendall and Roberts (JKR), for the first loading (a) and the
-last unloading up to the largest tension (b). Here F is the force, R the radius of the smooth sphere, and a the radius
-of a circle with the true contact area. A smooth sphere with a Tabor parameter of 3 or more gives a straight line of
-slope 3/(4 E*), and the work of adhesion w follows from the value at F = 0, 3 sqrt(8 π E* w)/(4 E*). Markers are states
-of all seeds, at most one hundred of each run at equal steps of the indentation. States with F/a^(3/2) below -sqrt(8 π
-E* Δγ), where no sphere of JKR has contact (Δγ of receding edges), are not shown; in unloading with two works of
-adhesion, neither are states whose edge stands. A fit minimises the squared differences of a³ at given F, with the given
-E* and R, so states with a large radius have most weight. The legend gives means over the seeds."""
-
-
-@in_style
-def jkr_plot(
-    campaign: xr.DataTree,
-    tables: Sequence[str | os.PathLike] = (),
-    *,
-    study: str,
-    measurements: Sequence[Mapping[str, Any]] = (),
-) -> Figure:
-    """Draw a^(3/2)/R against F/a^(3/2) for loading and unloading, with the fitted JKR lines.
-
-    The equation of JKR, F = 4 E* a^3/(3 R) - sqrt(8 pi E* w a^3), is the straight line y = 3 (x + sqrt(8 pi E* w))/(4
-    E*) with x = F/a^(3/2) and y = a^(3/2)/R. Runs without adhesion, without a radius R, and on a layer are left out.
-    Tables and measurements (`icha.figures.indenter_curves.read_measured`) with forces and contact radii are shown too.
-    The largest force is the end of loading, and R is that of the runs.
-    """
-    series = select_series(campaign, study, only_jkr=True)
-    drawn = []
-    for each in series:
-        for seed, run in each.runs.by_seed.items():
-            labels = each.runs.labels._replace(seed=seed)
-            for branch, choose in BRANCHES.items():
-                states = choose(steps_of(run))
-                chosen = [states[k] for k in spaced_states([state["indentation"] for state in states])]
-                force, radius = (np.array([state[name] for state in chosen]) for name in ("force", "contact_radius"))
-                x, y = force / radius**1.5, radius**1.5 / float(run["shape_radius"])
-                # The line of JKR is zero here. States beyond it, of little contact area, would hide the others.
-                work = max(float(run["surface_energy"]), float(run["receding_energy"]))
-                inside = x > -np.sqrt(8 * np.pi * float(run["contact_modulus"]) * work)
-                drawn.append((branch, each, labels, run, x[inside], y[inside]))
-    scale, unit = choose_unit(max(float(np.abs(x).max(initial=0.0)) for *_, x, _ in drawn), "N")
-    fig, [panels] = new_panels(3.0, sharex=True, sharey=True)
-    say(fig, _LINE, only_spheres(campaign[study].to_dataset()))
-    for branch, each, labels, run, x, y in drawn:
-        ax = panels[list(_TITLES).index(branch)]
-        plot(ax, x * scale, y * 1e3, Name("states", labels), marker=_TITLES[branch][1], mec=each.colour, **_STATES)
-        if (name := f"work_of_adhesion_{branch}") in run:
-            modulus = float(run["contact_modulus"])
-            line = 0.75 / modulus * (x + np.sqrt(8 * np.pi * modulus * float(run[name])))
-            plot(ax, x * scale, line * 1e3, Name("fit of JKR", labels), color=each.colour, **_FIT)
-    measured = read_measured(fig, tables, measurements, "force", "contact_radius")
-    for each in measured:
-        force, radius = each.values["force"], each.values["contact_radius"]
-        x, y = force / radius**1.5, radius**1.5 / float(series[0].first_run["shape_radius"])
-        top = int(np.argmax(force))
-        for ax, part in zip(panels, (slice(top + 1), slice(top, None)), strict=True):
-            plot(ax, x[part] * scale, y[part] * 1e3, each.label, **each.look)
-    for ax, (name, _) in zip(panels, _TITLES.values(), strict=True):
-        ax.set_title(name, loc="right")
-        ax.set(xlabel=rf"$F/a^{{3/2}}$  ({unit} m$^{{-3/2}}$)", ylabel=r"$a^{3/2}/R$  ($10^{-3}$ m$^{1/2}$)")
-        ax.label_outer()
-    handles = {f"{each.name}: {_works(each)}": legend_handle(color=each.colour, **_FIT) for each in series}
-    states = {"states": legend_handle(marker="o", mec=GREY, **_STATES), "fit of JKR": legend_handle(color=GREY, **_FIT)}
-    legend_below(fig, handles | states | {each.label: legend_handle(**each.look) for each in measured})
-    return fig
-
-
-def _works(series):
-    """Return the mean fitted works of adhesion of a series as text, or why there are none."""
-    words, runs = [], list(series.runs.by_seed.values())
-    for branch, (title, _) in _TITLES.items():
-        name = f"work_of_adhesion_{branch}"
-        values = [float(run[name]) for run in runs if name in run]
-        if values:
-            fewer = f" ({len(values)} of {len(runs)} seeds)" if len(values) < len(runs) else ""
-            words.append(f"{title} {format_quantity(float(f'{np.mean(values):.3g}'), 'J/m²')}{fewer}")
-        else:
-            words.append(f"{title} no fit ({reason_without_fit(runs[0], branch)})")
-    return ", ".join(words)

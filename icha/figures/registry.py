@@ -21,9 +21,10 @@ _MODULES = {
     **dict.fromkeys(("area_and_gap", "multi_slope", "stiffness"), "against_load"),
     **dict.fromkeys(("distributions", "patch_sizes"), "at_one_load"),
     **dict.fromkeys(("contact_map", "spots_by_slope", "snap_map", "pressure_maps"), "contact_maps"),
-    **dict.fromkeys(("tabor", "pull_off", "loss", "work_of_adhesion"), "against_parameter"),
+    **dict.fromkeys(("tabor", "pull_off", "loss"), "against_parameter"),
     **dict.fromkeys(("model_error", "distribution_error"), "errors"),
-    **dict.fromkeys(("loops", "force_indentation", "jkr_plot"), "loops"),
+    "loops": "loops",
+    **dict.fromkeys(("force_indentation", "jkr_plot", "work_of_adhesion"), "indenters"),
     **dict.fromkeys(("sensitivity", "parameters"), "samples"),
     "own": "own_figure",
 }

@@ -40,7 +40,8 @@ def sensitivity(sensitivity: xr.DataTree, *, study: str, target: int = -1) -> Fi
         raise NothingToDraw(f"study {study}: too few cases have results; expected at least twice the parameters")
     names = data["parameter"].values.tolist()
     size = 0.75 + 0.34 * len(names), TWO_COLUMNS / 2
-    fig, panels, columns = new_grid(shown.sizes["response"], 2, *size, room=(0.0, 0.4), sharex=True, sharey=True)
+    options = {"room": (0.0, 0.4), "xlabel": "share of variance (%)", "sharex": True, "sharey": True}
+    fig, panels = new_grid(shown.sizes["response"], 2, *size, **options)
     say(
         fig,
         """Share of the variance of the logarithm of each result that each sampled parameter causes. Filled bars: the
@@ -60,8 +61,6 @@ def sensitivity(sensitivity: xr.DataTree, *, study: str, target: int = -1) -> Fi
         ax.set_title(response_words(data, row), loc="right", fontsize=8)
         ax.set(xlim=(0, 105), yticks=places, yticklabels=[symbol_of(name) for name in names])
         ax.tick_params(axis="y", length=0)
-    for ax in panels[-columns:]:
-        ax.set_xlabel("share of variance (%)")
     panels[0].invert_yaxis()
     legend_below(fig, handles)
     return fig
@@ -84,8 +83,8 @@ def parameters(
     factor, unit = described.in_unit(float(row["middle"]))
     results = values.values * factor
     names = data["parameter"].values.tolist()
-    size = {"row_height": 2.0, "column_width": TWO_COLUMNS / 3, "room": (0.0, 0.3), "least": 1.5}
-    fig, panels, columns = new_grid(len(names), 3, **size, sharey=True)
+    options = {"room": (0.0, 0.3), "least": 1.5, "ylabel": described.label(unit), "sharey": True}
+    fig, panels = new_grid(len(names), 3, 2.0, TWO_COLUMNS / 3, **options)
     say(fig, _AGAINST)
     handles = {f"one case: {response_words(data, row)}": legend_handle(**_CASE)}
     if fitted:
@@ -97,8 +96,6 @@ def parameters(
             mean = row["main_effect"].values[k] * factor
             plot(ax, data["effect_value"].values[k] * scale, mean, _MEAN, color=VERMILLION)
         ax.set_xlabel(label)
-    for ax in panels[::columns]:
-        ax.set_ylabel(described.label(unit))
     if np.nanmax(results) > _DECADE * np.nanmin(results):
         logarithmic_axes(panels[0], "y")
     legend_below(fig, handles)

@@ -58,7 +58,7 @@ class ContactRuns(NamedTuple):
     @property
     def model_name(self) -> str:
         """Name of the model in legends."""
-        return name_of_model(next(iter(self.by_seed.values())))
+        return name_of_model(self.first)
 
     @property
     def drawn_name(self) -> Name:
@@ -67,14 +67,19 @@ class ContactRuns(NamedTuple):
         return Name(self.model_name, self.labels._replace(seed=None) if several else self.labels)
 
     @property
-    def names_of_seeds(self) -> dict[int, Name]:
-        """Names of the single runs in the table of a figure, by seed."""
-        return {seed: Name(self.model_name, self.labels._replace(seed=seed)) for seed in self.by_seed}
+    def first(self) -> xr.Dataset:
+        """The first run."""
+        return next(iter(self.by_seed.values()))
+
+    @property
+    def members(self) -> list[tuple[RunLabels, xr.Dataset]]:
+        """Labels and dataset of every run."""
+        return [(self.labels._replace(seed=seed), run) for seed, run in self.by_seed.items()]
 
     @property
     def surface_energy(self) -> float:
         """Surface energy of the material, J/m^2."""
-        return float(next(iter(self.by_seed.values()))["surface_energy"])
+        return float(self.first["surface_energy"])
 
 
 def group_by_contact(

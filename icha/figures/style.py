@@ -27,6 +27,8 @@ ORANGE, SKY, PURPLE, BLACK = "#E69F00", "#56B4E9", "#CC79A7", "#000000"
 COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 DASHES = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 2, 1, 2)), (0, (3, 1, 1, 1, 1, 1)))
 GREY = "0.45"
+# Space around the values on an axis, divided by their range.
+_MARGIN = 0.06
 
 RC = {
     "font.family": "STIXGeneral",
@@ -100,12 +102,14 @@ def new_grid(
     *,
     room: tuple[float, float] = (0.0, 0.0),
     least: float = 1.0,
+    xlabel: str = "",
+    ylabel: str = "",
     **options: object,
-) -> tuple[Figure, np.ndarray, int]:
-    """Return a figure with `count` panels in rows of at most `most`, its panels, and the number of columns.
+) -> tuple[Figure, np.ndarray]:
+    """Return a figure with `count` panels in rows of at most `most`, and its panels.
 
-    `room` is added to the width and the height of the panels, inches; `least` is the least width in columns. The panels
-    `[-columns:]` have no panel below, the panels `[::columns]` none on the left.
+    `room` is added to the width and the height of the panels, inches; `least` is the least width in columns. Panels
+    without a panel below have the label `xlabel`, panels without a panel on the left the label `ylabel`.
     """
     columns = min(count, most)
     rows = -(-count // columns)
@@ -116,7 +120,10 @@ def new_grid(
         axes.remove()
     for axes in panels[-columns:]:
         axes.tick_params(labelbottom=True)
-    return figure, panels, columns
+        axes.set_xlabel(xlabel)
+    for axes in panels[::columns]:
+        axes.set_ylabel(ylabel)
+    return figure, panels
 
 
 @in_style
@@ -154,6 +161,12 @@ def _minor_label(axis, value, _):
     visible = [np.count_nonzero((low <= each * powers) & (each * powers <= high)) for each in (1, 2, 5)]
     shown = visible[0] < 2 and (sum(visible) < 2 or np.isclose(digit, (2, 5)).any())
     return rf"${digit:g}\times10^{{{exponent:g}}}$" if shown else ""
+
+
+def limits_around(values: np.ndarray) -> tuple[float, float]:
+    """Return the limits of an axis around some values."""
+    room = _MARGIN * np.ptp(values)
+    return float(values.min() - room), float(values.max() + room)
 
 
 def legend_handle(x=(), y=(), **look) -> Line2D:

@@ -14,16 +14,15 @@ from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import write_dataset
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of
-from icha.figures import against_load, against_parameter, at_one_load, contact_maps, loops, select
+from icha.figures import against_load, at_one_load, contact_maps, indenters, loops, select
 from icha.figures.captions import units_of_shapes
 from icha.figures.drawn import caption_of, table_of
-from icha.figures.indenter_curves import select_series
 from icha.surfaces.shapes import Cone, CylinderPunch, Sphere
 
 SIDE, GRID, MODULUS, RADIUS = 40e-6, 40, 1e6, 1e-3
 ENERGY = (4e-6) ** 3 * MODULUS / RADIUS**2
 PULL_OFF = 1.5 * math.pi * ENERGY * RADIUS
-FIGURES = loops.force_indentation, loops.jkr_plot, against_parameter.work_of_adhesion
+FIGURES = indenters.force_indentation, indenters.jkr_plot, indenters.work_of_adhesion
 
 
 def press(*arguments, **named):
@@ -55,7 +54,7 @@ def lines(ax):
 
 
 def test_forces_are_those_of_the_runs_beside_jkr_and_hertz(campaign):
-    (ax,) = loops.force_indentation(campaign, study="press").axes
+    (ax,) = indenters.force_indentation(campaign, study="press").axes
     assert ax.get_xlabel() == label_of("indentation", "nm") and ax.get_ylabel().startswith("force ")
     jkr, hertz = lines(ax)[:2]
     factor = {"µ": 1e6, "n": 1e9}[ax.get_ylabel().split("(")[1][0]]
@@ -66,7 +65,7 @@ def test_forces_are_those_of_the_runs_beside_jkr_and_hertz(campaign):
 
 
 def test_states_of_a_smooth_sphere_are_on_the_line_of_jkr(campaign):
-    fig = loops.jkr_plot(campaign, study="press")
+    fig = indenters.jkr_plot(campaign, study="press")
     for ax in fig.axes:
         states, fit = lines(ax)[:2]
         np.testing.assert_allclose(states[:, 0], fit[:, 0])
@@ -79,7 +78,7 @@ def test_states_of_a_smooth_sphere_are_on_the_line_of_jkr(campaign):
 def test_the_line_of_jkr_leaves_out_shapes_without_a_radius():
     sphere = press()
     several, alone = tree_of(press(shape=CylinderPunch(1e-5)), press(shape=Cone(1.56)), sphere), tree_of(sphere)
-    fig, only = (loops.jkr_plot(tree, study="press") for tree in (several, alone))
+    fig, only = (indenters.jkr_plot(tree, study="press") for tree in (several, alone))
     for ax, expected in zip(fig.axes, only.axes, strict=True):
         for line, other in zip(lines(ax), lines(expected), strict=True):
             np.testing.assert_allclose(line, other)
@@ -96,7 +95,7 @@ def lenses():
 
 
 def test_each_panel_has_the_theories_of_its_own_runs(lenses):
-    figure = loops.force_indentation(lenses, study="press")
+    figure = indenters.force_indentation(lenses, study="press")
     panels = {ax.get_title("right"): ax for ax in figure.axes}
     assert panels.keys() == {"small, smooth, soft", "small, smooth, dry", "large, smooth, soft"}
     factor = {"µ": 1e6, "n": 1e9}[figure.axes[0].get_ylabel().split("(")[1][0]]
@@ -112,7 +111,7 @@ def test_each_panel_has_the_theories_of_its_own_runs(lenses):
 
 
 def test_lenses_have_names_and_colours_of_their_own_and_bare_ones_are_left_out(lenses):
-    figure = loops.jkr_plot(lenses, study="press")
+    figure = indenters.jkr_plot(lenses, study="press")
     (legend,) = figure.legends
     entries = [(text.get_text(), line) for text, line in zip(legend.get_texts(), legend.legend_handles, strict=True)]
     names = {text.partition(":")[0]: line.get_color() for text, line in entries if "loading" in text}
@@ -121,12 +120,12 @@ def test_lenses_have_names_and_colours_of_their_own_and_bare_ones_are_left_out(l
 
 
 def test_points_of_different_lenses_are_not_joined(lenses, campaign):
-    figure = against_parameter.work_of_adhesion(lenses, study="press")
+    figure = indenters.work_of_adhesion(lenses, study="press")
     assert all(len(line) == 1 for line in lines(figure.axes[0])[:-1])
     names = [text.get_text() for text in figure.legends[0].get_texts()]
     assert {"small", "large"} < set(names) and not [name for name in names if "dry" in name]
     # A smooth and a rough sphere of the same radius are joined.
-    joined = against_parameter.work_of_adhesion(campaign, study="press").axes[0]
+    joined = indenters.work_of_adhesion(campaign, study="press").axes[0]
     assert [len(line) for line in lines(joined)[:-1]].count(2) == 3
 
 
@@ -143,7 +142,7 @@ def test_states_beyond_jkr_do_not_spoil_the_axes_and_spheres_of_long_range_have_
     # There are no reduced values of a smooth shape, and values of full contact are those of the roughness.
     assert "reduced_" not in shown and shown.count("of the roughness alone") == 2
     assert loops.loops(tree, study="press").axes[0].get_xlabel().startswith(label_of("mean_separation"))
-    figure = loops.jkr_plot(tree, study="press")
+    figure = indenters.jkr_plot(tree, study="press")
     lowest = min(line[:, 0].min() for ax in figure.axes for line in lines(ax))
     factor = {"k": 1e-3, "N": 1.0}[figure.axes[0].get_xlabel().split("(")[1][0]]
     assert -math.sqrt(8 * math.pi * MODULUS * ENERGY) < lowest / factor < 0
@@ -163,7 +162,7 @@ def test_captions_say_that_theories_of_flat_surfaces_do_not_hold_under_a_shape(m
 
 
 def test_works_of_adhesion_of_a_smooth_sphere_are_one(campaign):
-    (ax,) = against_parameter.work_of_adhesion(campaign, study="press").axes
+    (ax,) = indenters.work_of_adhesion(campaign, study="press").axes
     at_zero = [line[line[:, 0] == 0, 1] for line in lines(ax)[:-1]]
     values = np.concatenate(at_zero)
     assert len(values) == 6  # each of three quantities as a seed and as a mean
@@ -191,7 +190,7 @@ def test_fig5_draws_a_measurement_of_a_rough_sphere_where_the_run_is(tmp_path):
 
 def test_measurements_of_indenters_are_drawn_in_the_units_of_the_figures(campaign, tmp_path):
     """The points of the smooth sphere's run, as a table, lie on its curves."""
-    run = next(iter(select_series(campaign, "press")[0].runs.by_seed.values()))
+    run = next(iter(indenters.select_series(campaign, "press")[0].runs.by_seed.values()))
     steps = np.flatnonzero(run["contact_radius"].values > 0)
     force, depth, radius = (run[name].values[steps] for name in ("force", "indentation", "contact_radius"))
     height = 1e-8
@@ -209,17 +208,17 @@ def test_measurements_of_indenters_are_drawn_in_the_units_of_the_figures(campaig
         shown = [[each for each in ax.get_lines() if each.get_marker() == "x"] for ax in fig.axes]
         return fig, [np.concatenate([each.get_xydata() for each in found]) for found in shown]
 
-    fig, points = drawn(loops.force_indentation)
+    fig, points = drawn(indenters.force_indentation)
     curves = np.concatenate([line.get_xydata() for line in fig.axes[0].get_lines() if line.get_marker() == "None"])
     for point in points[0]:
         assert np.isclose(curves, point, rtol=1e-6, atol=1e-9).all(axis=1).any()
-    fig, points = drawn(loops.jkr_plot)
+    fig, points = drawn(indenters.jkr_plot)
     top = int(np.argmax(force))
     assert [len(each) for each in points] == [top + 1, len(steps) - top]
     scale = {"kN": 1e-3, "N": 1.0, "MN": 1e-6, "mN": 1e3}[fig.axes[0].get_xlabel().split("(")[1].split()[0]]
     expected = np.transpose([force / radius**1.5 * scale, radius**1.5 / RADIUS * 1e3])
     np.testing.assert_allclose(points[0], expected[: top + 1], rtol=1e-6)
-    fig, points = drawn(against_parameter.work_of_adhesion)
+    fig, points = drawn(indenters.work_of_adhesion)
     unit = {"nm": 1e9, "µm": 1e6}[fig.axes[0].get_xlabel().split("(")[1].rstrip(")")]
     np.testing.assert_allclose(points[0][0], [height * unit, 2.0])
 
@@ -249,18 +248,18 @@ def test_maps_show_the_pressure_at_every_snapshot():
 
 def test_reasons_for_an_empty_figure():
     bare = tree_of(press(energy=0.0))
-    loops.force_indentation(bare, study="press")
+    indenters.force_indentation(bare, study="press")
     for module in FIGURES[1:]:
         with pytest.raises(select.NothingToDraw, match="no sphere with adhesion"):
             module(bare, study="press")
     cone = tree_of(press(shape=Cone(1.56)))
-    assert len(lines(loops.force_indentation(cone, study="press").axes[0])) == 3  # both legs, and zero force
+    assert len(lines(indenters.force_indentation(cone, study="press").axes[0])) == 3  # both legs, and zero force
     with pytest.raises(select.NothingToDraw, match="no sphere with adhesion"):
-        loops.jkr_plot(cone, study="press")
+        indenters.jkr_plot(cone, study="press")
 
 
 def test_a_study_with_both_models_shows_boundary_elements():
     labels = [RunLabels("press", model, "s0", 0, 0.1, "soft") for model in ("asperities", "boundary_elements")]
     both = campaign_tree(zip(labels, (press(), press()), strict=True))
-    (series,) = select_series(both, "press")
+    (series,) = indenters.select_series(both, "press")
     assert series.runs.labels.model == "boundary_elements"
