@@ -2,6 +2,7 @@
 
 from contextlib import contextmanager
 
+import netCDF4
 import numpy as np
 import pytest
 
@@ -41,6 +42,23 @@ def write_xyz(path, order=slice(None), separator=" "):
     y, x = np.mgrid[:ROWS, :COLUMNS] * 250.0
     table = np.column_stack([x.ravel(), y.ravel(), HEIGHTS.ravel()])[order]
     path.write_text("\n".join(separator.join(f"{number:g}" for number in line) for line in table) + "\n")
+    return path
+
+
+def write_netcdf(path, turned=False, backwards=False, unit="nm", lateral="um", kind="NETCDF4"):
+    """Write a map with its axes, in one order or the other, and one more array."""
+    with netCDF4.Dataset(path, "w", format=kind) as file:
+        for name, count in (("y", ROWS), ("x", COLUMNS)):
+            file.createDimension(name, count)
+            file.createVariable(name, "f8", (name,))[:] = np.arange(count) * 0.25
+            file[name].units = lateral
+        stored = HEIGHTS[::-1] if backwards else HEIGHTS
+        height = file.createVariable("height", "f8", ("x", "y") if turned else ("y", "x"), fill_value=-9999.0)
+        height[:] = stored.T if turned else stored
+        height.units = unit
+        if backwards:
+            file["y"][:] = np.arange(ROWS)[::-1] * 0.25
+        file.createVariable("phase", "f8", ("y", "x"))[:] = 1.0
     return path
 
 

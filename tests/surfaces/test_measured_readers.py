@@ -3,24 +3,19 @@
 import struct
 import zipfile
 import zlib
+from functools import partial
 from pathlib import Path
 
 import h5py
 import netCDF4
 import numpy as np
 import pytest
-from scans import COLUMNS, HEIGHTS, NM, ROWS, SIZE, UM, assert_read, preparation, refused, scan, write_xyz
+from scans import COLUMNS, HEIGHTS, NM, ROWS, SIZE, UM, assert_read, preparation, refused, scan, write_netcdf, write_xyz
 from scipy.io import savemat
 from SurfaceTopography.Exceptions import CorruptFile
 
 from icha.surfaces.measured.settings import UnfitTopography
 from icha.surfaces.measured.topography import prepared_topography
-
-
-@pytest.mark.parametrize(("first_axis", "stored"), [("y", HEIGHTS), ("x", HEIGHTS.T)])
-def test_npy(tmp_path, first_axis, stored):
-    np.save(tmp_path / "scan.npy", stored)
-    assert_read(scan(tmp_path / "scan.npy", height_unit=NM, size=SIZE, first_axis=first_axis))
 
 
 def test_first_axis_exchanges_rows_and_cells(tmp_path):
@@ -63,46 +58,20 @@ def test_xyz_with_a_point_twice_or_off_the_grid(tmp_path):
         scan(path, height_unit=NM)
 
 
-def write_netcdf(path, turned=False, backwards=False, names=("y", "x"), unit="nm", lateral="um", leading=()):
-    with netCDF4.Dataset(path, "w") as file:
-        for name in leading:
-            file.createDimension(name, 1)
-        for name, count in zip(names, (ROWS, COLUMNS), strict=True):
-            file.createDimension(name, count)
-            axis = file.createVariable(name, "f8", (name,))
-            axis.units = lateral
-            axis[:] = np.arange(count) * 0.25
-        height = file.createVariable(
-            "height", "f8", (*leading, *(names[::-1] if turned else names)), fill_value=-9999.0
-        )
-        height.units = unit
-        stored = HEIGHTS[::-1] if backwards else HEIGHTS
-        height[:] = stored.T if turned else stored
-        if backwards:
-            file[names[0]][:] = np.arange(ROWS)[::-1] * 0.25
-        other = file.createVariable("phase", "f8", names)
-        other[:] = 1.0
-    return path
-
-
 @pytest.mark.parametrize("keys", [{}, {"turned": True}, {"backwards": True}, {"turned": True, "backwards": True}])
 def test_netcdf_says_its_axes_and_units(tmp_path, keys):
     assert_read(scan(write_netcdf(tmp_path / "scan.nc", **keys)))
 
 
-def test_netcdf_fill_values_are_missing_points(tmp_path):
-    path = write_netcdf(tmp_path / "scan.nc")
-    with netCDF4.Dataset(path, "a") as file:
-        file["height"][3, 7] = -9999.0
-    assert np.argwhere(np.isnan(scan(path).heights)).tolist() == [[3, 7]]
-
-
-def test_unit_of_the_file_and_unit_that_is_given(tmp_path):
+def test_units_and_missing_points_of_the_file(tmp_path):
     path = write_netcdf(tmp_path / "scan.nc", unit="um")
     assert_read(scan(path), UM)
     assert_read(scan(path, height_unit=NM), NM)
     with refused("height_unit"):
         scan(write_netcdf(tmp_path / "volts.nc", unit="V"))
+    with netCDF4.Dataset(path, "a") as file:
+        file["height"][3, 7] = -9999.0  # the fill value
+    assert np.argwhere(np.isnan(scan(path).heights)).tolist() == [[3, 7]]
 
 
 @pytest.mark.parametrize(("first_axis", "stored"), [("y", HEIGHTS), ("x", HEIGHTS.T)])
@@ -236,18 +205,22 @@ def test_a_damaged_text_of_an_instrument_is_refused_as_one(tmp_path, monkeypatch
         monkeypatch.setattr("SurfaceTopography.open_topography", corrupt)
 
 
-@pytest.mark.parametrize(
-    ("name", "text"),
-    [
-        ("profile.txt", "\n".join(f"{k * 0.1} {k % 7}" for k in range(50))),
-        ("profile.txt", "\n".join(f"{k % 7}" for k in range(50))),
-        ("profile.xyz", "\n".join(f"{k * 0.1} 2.5 {k % 7}" for k in range(50))),
-        ("profile.csv", "X;Y;valid\n[mm];[mm];[1/0]\n" + "\n".join(f"{k * 0.1};{k % 7};1" for k in range(50))),
-    ],
-)
-def test_a_line_scan_is_refused_as_one(tmp_path, name, text):
-    (tmp_path / name).write_text(text + "\n")
-    with refused("path", "is a line scan, one profile of 50 points"):
+LINE_SCAN = "is a line scan, one profile of 50 points"
+TITLES = "X;Y;valid\n[mm];[mm];[1/0]\n"
+WITHOUT_A_MAP = [
+    ("profile.txt", "\n".join(f"{k * 0.1} {k % 7}" for k in range(50)), LINE_SCAN),
+    ("profile.txt", "\n".join(f"{k % 7}" for k in range(50)), LINE_SCAN),
+    ("profile.xyz", "\n".join(f"{k * 0.1} 2.5 {k % 7}" for k in range(50)), LINE_SCAN),
+    ("profile.csv", TITLES + "\n".join(f"{k * 0.1};{k % 7};1" for k in range(50)), LINE_SCAN),
+    *((f"scan.{ending}", "", "is empty") for ending in ("txt", "xyz", "npy", "nc", "h5", "dat")),
+    ("heading.xyz", "# width 90 um\n\n  # heights\n", "has no numbers"),
+]
+
+
+@pytest.mark.parametrize(("name", "content", "words"), WITHOUT_A_MAP)
+def test_a_file_without_a_map_of_heights_is_refused(tmp_path, name, content, words):
+    (tmp_path / name).write_text(content)
+    with refused("path", words):
         scan(tmp_path / name, height_unit=NM, size=SIZE)
 
 
@@ -259,22 +232,11 @@ def test_what_is_missing_is_named(tmp_path):
     np.save(tmp_path / "scan.npy", HEIGHTS + 0j)
     with pytest.raises(UnfitTopography, match="complex128"):
         scan(tmp_path / "scan.npy", height_unit=NM, size=SIZE)
-    with pytest.raises(UnfitTopography, match="no such file"):
-        prepared_topography(tmp_path / "nothing.npy", preparation())
-
-
-@pytest.mark.parametrize("name", ["scan.txt", "scan.xyz", "scan.npy", "scan.nc", "scan.h5", "scan.dat"])
-def test_an_empty_file_is_refused(tmp_path, name):
-    (tmp_path / name).touch()
-    with refused("path", "is empty"):
-        scan(tmp_path / name, height_unit=NM, size=SIZE)
-
-
-@pytest.mark.parametrize("kind", ["matrix", "xyz"])
-def test_a_heading_alone_is_refused(tmp_path, kind):
     (tmp_path / "scan.txt").write_text("# width 90 um\n\n  # heights\n")
     with refused("path", "has no numbers"):
-        scan(tmp_path / "scan.txt", format=kind, height_unit=NM, size=SIZE)
+        scan(tmp_path / "scan.txt", format="matrix", height_unit=NM, size=SIZE)
+    with pytest.raises(UnfitTopography, match="no such file"):
+        prepared_topography(tmp_path / "nothing.npy", preparation())
 
 
 # --- arrays and channels: the chosen one is reported, and those of MATLAB have the right orientation ---
@@ -290,14 +252,25 @@ def write_npz(path, **arrays):
     np.savez(path, **arrays)
 
 
-def write_new_mat(path, **arrays):
-    """MATLAB 7.3 stores the transpose of each array in HDF5."""
-    with h5py.File(path, "w") as file:
+def write_new_mat(path, attribute=False, block=0, **arrays):
+    """MATLAB 7.3 stores the transpose of each array in HDF5, with attributes and a heading if it did so itself."""
+    with h5py.File(path, "w", userblock_size=block) as file:
         for name, array in arrays.items():
             file[name] = array.T
+            if attribute:
+                file[name].attrs["MATLAB_class"] = np.bytes_("double")
+        file["title"] = np.frombuffer(b"a scan of mine", "u1").astype("u2").reshape(7, 2)
+        file["title"].attrs["MATLAB_class"] = np.bytes_("char")
+        file["mask"] = (HEIGHTS.T > 0).astype("u1")
+        file["mask"].attrs["MATLAB_class"] = np.bytes_("logical")
+        file["#refs#/a"] = HEIGHTS.T
+    if block:
+        with path.open("r+b") as file:
+            file.write(b"MATLAB 7.3 MAT-file")
 
 
-WRITERS = [("scan.mat", write_mat), ("scan.npz", write_npz), ("scan.mat", write_new_mat)]
+MAT = [partial(write_new_mat, attribute=attribute, block=block) for attribute in (False, True) for block in (0, 512)]
+WRITERS = [("scan.mat", write_mat), ("scan.npz", write_npz), *(("scan.mat", write) for write in MAT)]
 
 
 @pytest.mark.parametrize(("name", "write"), WRITERS)
@@ -317,11 +290,13 @@ def test_of_several_arrays_one_must_be_named(tmp_path, name, write):
         assert read.data == ""
 
 
-@pytest.mark.parametrize(("name", "write"), WRITERS)
+@pytest.mark.parametrize(("name", "write"), [*WRITERS, ("scan.npy", lambda path, Z: np.save(path, Z))])
 def test_rows_run_along_x_unless_first_axis_says_otherwise(tmp_path, name, write):
     """The same rule for all arrays whose axes have no names."""
     write(tmp_path / name, Z=HEIGHTS)
-    assert_read(scan(tmp_path / name, **LINES))
+    read = scan(tmp_path / name, **LINES)
+    assert_read(read)
+    assert (read.format == "matlab") == name.endswith(".mat")
     write(tmp_path / name, Z=HEIGHTS.T)
     assert_read(scan(tmp_path / name, first_axis="x", **LINES))
 
@@ -335,28 +310,6 @@ def test_first_axis_against_the_file_is_refused(tmp_path):
         scan(tmp_path / "other.nc", format="instrument", first_axis="x")
     with refused("first_axis", "the file states which of its axes is x"):
         scan(write_xyz(tmp_path / "scan.xyz"), height_unit=NM, lateral_unit=NM, first_axis="x")
-
-
-@pytest.mark.parametrize("attribute", [True, False])
-@pytest.mark.parametrize("block", [0, 512])
-def test_new_files_of_matlab_are_the_right_way_round(tmp_path, attribute, block):
-    path = tmp_path / "scan.mat"
-    with h5py.File(path, "w", userblock_size=block) as file:
-        for name, array in (("Z", HEIGHTS), ("step", np.ones((1, 1)))):
-            file[name] = array.T
-            if attribute:
-                file[name].attrs["MATLAB_class"] = np.bytes_("double")
-        file["title"] = np.frombuffer(b"a scan of mine", "u1").astype("u2").reshape(7, 2)
-        file["title"].attrs["MATLAB_class"] = np.bytes_("char")
-        file["mask"] = (HEIGHTS.T > 0).astype("u1")
-        file["mask"].attrs["MATLAB_class"] = np.bytes_("logical")
-        file["#refs#/a"] = HEIGHTS.T
-    if block:
-        with path.open("r+b") as file:
-            file.write(b"MATLAB 7.3 MAT-file")
-    read = scan(path, **LINES)
-    assert_read(read)
-    assert read.format == "matlab"
 
 
 @pytest.mark.parametrize(

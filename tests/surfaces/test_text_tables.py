@@ -55,10 +55,6 @@ def test_a_plane_is_not_a_table_with_numbered_rows(tmp_path):
         prepared_topography(written(tmp_path, text(rows(plane))), vars(settings))
 
 
-def test_numbers_as_fortran_writes_them(tmp_path):
-    assert_heights(read(written(tmp_path, text(rows(write=lambda height: f"{height:.10E}".replace("E", "D")), " "))))
-
-
 def points(*further):
     y, x = np.mgrid[:GRID, :GRID] * SIDE / GRID / UM
     return [
@@ -67,7 +63,7 @@ def points(*further):
 
 
 @pytest.mark.parametrize("further", [np.zeros(GRID**2), np.random.default_rng(4).integers(0, 255, GRID**2)])
-def test_points_with_a_column_too_many(tmp_path, further):
+def test_points_with_a_column_too_many_or_too_few(tmp_path, further):
     path = written(tmp_path, text(points(further), " "), "scan.txt")
     with refused("columns", r"lines have 4 numbers.*\[1, 2, 3\]"):
         read(path)
@@ -75,6 +71,8 @@ def test_points_with_a_column_too_many(tmp_path, further):
     lines[50][2] = "no data"
     path = written(tmp_path, text(lines, ","), "scan.xyz")
     assert_heights(read(path, columns=(1, 2, 3), size=None, lateral_unit=UM), missing=1)
+    with refused("columns", r"^is larger than the number of columns; expected 1 to 4"):
+        read(path, columns=(1, 2, 9))
 
 
 # --- coordinates, commas, several images, counts, damage -------------------------------------------------------------
@@ -95,11 +93,6 @@ def test_coordinates_along_an_edge_are_asked_about(tmp_path, write, row, column,
         read(written(tmp_path, text(with_coordinates(along, row, column, corner))))
 
 
-def test_numbers_in_the_last_column_are_asked_about(tmp_path):
-    with refused("path", "last column"):
-        read(written(tmp_path, text([[*row, str(k)] for k, row in enumerate(rows())])))
-
-
 def test_heights_along_an_edge_are_no_coordinates(tmp_path):
     """An egg box whose first row and column are zero, a facet, a saddle; and zeros below the first row."""
     y, x = 2 * np.pi * np.mgrid[:GRID, :GRID] / GRID
@@ -109,13 +102,6 @@ def test_heights_along_an_edge_are_no_coordinates(tmp_path):
     for heights in (box, np.abs(x - np.pi) + np.sin(3 * y), x * y, first):
         read_ = read(written(tmp_path, text(rows(heights, "{:.4f}".format))))
         assert read_.surface.grid == GRID
-
-
-def test_a_corner_without_a_number_is_refused(tmp_path):
-    along = [f"{k / 3:.2f}" for k in range(GRID)]
-    for corner, delimiter, words in (("y/x", ",", "'y/x' in line 1"), ("", " ", "24 numbers in line 1 but 25")):
-        with refused("path", words):
-            read(written(tmp_path, text(with_coordinates(along, 1, 1, corner), delimiter), "scan.txt"))
 
 
 def test_delimiters_at_the_end_of_all_lines(tmp_path):
@@ -129,13 +115,6 @@ def test_delimiters_at_the_end_of_all_lines(tmp_path):
     assert_heights(read(written(tmp_path, text(lines), "scan.xyz"), size=None, lateral_unit=UM))
 
 
-def test_several_images_in_a_text_are_refused(tmp_path):
-    heading = "# Channel: {}\n# Width: 12.00 µm\n# Height: 12.00 µm\n# Value units: nm\n".format
-    two = [heading(name) + text(rows(), "\t") for name in ("Topography", "Phase")]
-    with refused("path", "2 blocks of rows, the second from line 34"):
-        read(written(tmp_path, "\n".join(two), "scan.txt"), height_unit=None, size=None)
-
-
 @pytest.mark.parametrize("between", ["\n", "# Channel B\n"])
 def test_blocks_of_rows_are_refused_but_not_empty_lines_between_all_rows(tmp_path, between):
     with refused("path", r"2 blocks of rows, the second from line 26"):
@@ -143,37 +122,25 @@ def test_blocks_of_rows_are_refused_but_not_empty_lines_between_all_rows(tmp_pat
     assert_heights(read(written(tmp_path, between.join(text([row]) for row in rows()))))
 
 
-def decimal(write, heights=HEIGHTS):
-    return rows(heights, lambda height: write.format(height).replace(".", ","))
-
-
-@pytest.mark.parametrize(("write", "delimiter"), [("{:.2f}", ","), ("{:.1f}", ","), ("{:.3f}", ", "), ("{:.2f}", " ")])
-def test_decimal_commas_between_commas_are_refused(tmp_path, write, delimiter):
-    with refused("path", "decimal"):
-        read(written(tmp_path, text(decimal(write), delimiter)))
-
-
-@pytest.mark.parametrize("delimiter", ["\t", ";"])
-def test_commas_before_three_digits_are_ambiguous(tmp_path, delimiter):
-    """1,234 is a thousand or a bit more than one; 0,234 and 1234,567 are decimal."""
-    with refused("path", "separate thousands"):
-        read(written(tmp_path, text(rows(1e4 + 10 * HEIGHTS, "{:,.0f}".format), delimiter)))
-    assert_heights(read(written(tmp_path, text(decimal("{:.3f}", HEIGHTS + 1e4), delimiter))))
-
-
-@pytest.mark.parametrize(("delimiter", "offset"), [(";", 5000), ("\t", 1000), ("\t", 5000), (" ", 5000)])
-def test_points_before_three_digits_may_separate_thousands(tmp_path, delimiter, offset):
-    integers = rows(HEIGHTS + offset, lambda height: f"{height:,.0f}".replace(",", "."))
-    with refused("path", "that may separate thousands.*add a digit"):
-        read(written(tmp_path, text(integers, delimiter)))
-
-
-@pytest.mark.parametrize(("delimiter", "blank"), [("\t", " "), (";", " "), ("\t", "\xa0"), (" ", "\u202f")])
-def test_blanks_that_may_separate_thousands_are_refused(tmp_path, delimiter, blank):
-    fields = rows(HEIGHTS + 5000, lambda height: f"{height:,.0f}".replace(",", blank))
-    with refused("path", "blanks may separate thousands or columns|has .* in line 1, column 1; expected a number"):
-        read(written(tmp_path, text(fields, delimiter)))
-    assert_heights(read(written(tmp_path, text(rows(), f" {delimiter} "))))
+@pytest.mark.parametrize(
+    ("heading", "words"),
+    [
+        *(
+            (["Scan size: 12 um x 12 um", "Unit: um", line], f"also {re.escape(repr(line))}, which may change it")
+            for line in ("Unit Z: nm", "Height [nm]", "The heights are in nm.")
+        ),
+        (["Z unit: nm", "Height unit: um"], "the file states nm and um"),
+        # Gwyddion writes the same Korean words for the unit of coordinates and that of heights.
+        (["# 채널: Z", "# 값 단위: nm", "# 값 단위: um"], "the file states nm and um"),
+    ],
+)
+def test_a_unit_that_a_heading_does_not_state_clearly_is_asked_for(tmp_path, heading, words):
+    path = written(tmp_path, text(rows(), " ", heading), "scan.txt")
+    with refused("height_unit", words):
+        read(path, height_unit=None)
+    assert_heights(read(path))
+    unit = written(tmp_path, text(rows(), " ", ["Scan size: 12 um x 12 um", "Unit: nm"]))
+    assert_heights(read(unit, height_unit=None))
 
 
 @pytest.mark.parametrize(
@@ -211,23 +178,6 @@ def test_lines_that_may_change_size_and_heights_are_asked_about(tmp_path, line):
     assert_heights(read(path))
 
 
-@pytest.mark.parametrize("line", ["Unit Z: nm", "Height [nm]", "The heights are in nm."])
-def test_a_unit_without_a_name_may_be_that_of_lengths(tmp_path, line):
-    heading = ["Scan size: 12 um x 12 um", "Unit: um"]
-    with refused("height_unit", f"also {re.escape(repr(line))}, which may change it"):
-        read(written(tmp_path, text(rows(), " ", [*heading, line])), height_unit=None)
-    alone = read(written(tmp_path, text(rows(), " ", ["Scan size: 12 um x 12 um", "Unit: nm"])), height_unit=None)
-    assert_heights(alone)
-
-
-def test_a_size_with_three_digits_behind_a_comma_is_ambiguous(tmp_path):
-    heading = ["# Channel: Z", "# Width: 1,250 um", "# Height: 1,250 um", "# Value units: nm"]
-    path = written(tmp_path, text(rows(), " ", heading), "scan.txt")
-    with refused("size", "1,250 um.*thousands"):
-        read(path, size=None)
-    assert_heights(read(path))
-
-
 @pytest.mark.parametrize("line", ["nrows 30", "ncols 12", "Lines: 30", "Columns: 25", '"Vertical",30'])
 def test_counts_of_a_heading_are_checked(tmp_path, line):
     count = line[-2:]
@@ -244,6 +194,7 @@ def test_counts_of_a_heading_are_checked(tmp_path, line):
         (["Scan size: 12 um x 6 um"], "do not fit"),
         (["Scan size: 10 um", "Pixel: 0.5 um"], "10 um, 0.5 um, do not fit"),
         (["Pixel: 0.5"], "does not contain the size"),
+        (["# Channel: Z", "# Width: 1,250 um", "# Height: 1,250 um"], "1,250 um.*thousands"),
     ],
 )
 def test_a_size_that_a_heading_does_not_state_clearly_is_asked_for(tmp_path, heading, words):
@@ -251,15 +202,6 @@ def test_a_size_that_a_heading_does_not_state_clearly_is_asked_for(tmp_path, hea
     with refused("size", words):
         read(path, size=None)
     assert_heights(read(path))
-
-
-def test_two_units_of_the_heights_are_asked_about(tmp_path):
-    # Gwyddion writes the same Korean words for the unit of coordinates and that of heights.
-    for heading in (["Z unit: nm", "Height unit: um"], ["# 채널: Z", "# 값 단위: nm", "# 값 단위: um"]):
-        path = written(tmp_path, text(rows(), " ", heading), "scan.txt")
-        with refused("height_unit", "the file states nm and um"):
-            read(path, height_unit=None)
-        assert_heights(read(path))
 
 
 # Width, height, value units and lateral units as Gwyddion translates them, in some of its languages.
@@ -296,12 +238,6 @@ def test_a_size_has_the_proportions_of_the_coordinates(tmp_path):
     assert "pixels of 1 um x 1 um" in read(path, size=(24 * UM, 20 * UM), boundary="mirror").reading
 
 
-def test_zygo_integers_are_refused(tmp_path):
-    heading = ["Zygo ASCII Data File - Format 2", '1 7 5 0 "Thu Jan 01 2026"', "0 0 0 0 0 0", "0 0 24 24", "#"]
-    with refused("path", "Zygo file without points"):
-        read(written(tmp_path, text(rows(write="{:.0f}".format), " ", heading)))
-
-
 @pytest.mark.parametrize(
     ("said", "stored"),
     [
@@ -318,22 +254,64 @@ def test_missing_values_agree_to_the_digits_that_are_written(tmp_path, said, sto
     assert_heights(read(written(tmp_path, text(fields, " ", heading), "scan.asc")), missing=1)
 
 
-def test_what_is_wrong_with_a_file_is_named(tmp_path):
-    content = text(rows(), " ").encode()
-    labelled = text([[f"L{k}", *row] for k, row in enumerate(rows())])
-    below_heading = text([["x" * 3, *row] for row in rows()], heading=["a,b", ""])
-    for damaged, words in (
-        (gzip.compress(content)[:-200], "the file is damaged"),
-        (labelled.encode(), "'L0' in line 1, column 1"),
-        (below_heading.encode(), "'xxx' in line 3"),
-        (text(rows()).replace("\n", "]\n").encode(), r"\]' in line 1, column 24"),
-        (text(rows()).replace("\n", '"\n', 1).encode(), "\"' in line 1, column 24"),
-    ):
-        (tmp_path / "scan.txt").write_bytes(damaged)
-        with refused("path", words):
-            read(tmp_path / "scan.txt")
-    with refused("columns", r"^is larger than the number of columns; expected 1 to 3"):
-        read(written(tmp_path, text(points(), " "), "scan.xyz"), columns=(1, 2, 9))
+def decimal(write, heights=HEIGHTS):
+    return rows(heights, lambda height: write.format(height).replace(".", ","))
+
+
+def thousands(separator, offset=5000):
+    return rows(HEIGHTS + offset, lambda height: f"{height:,.0f}".replace(",", separator))
+
+
+CONTENT = text(rows(), " ")
+THIRDS = [f"{k / 3:.2f}" for k in range(GRID)]
+BLANKS = "blanks may separate thousands or columns|has .* in line 1, column 1; expected a number"
+ZYGO = ["Zygo ASCII Data File - Format 2", '1 7 5 0 "Thu Jan 01 2026"', "0 0 0 0 0 0", "0 0 24 24", "#"]
+IMAGE = "# Channel: {}\n# Width: 12.00 µm\n# Height: 12.00 µm\n# Value units: nm\n" + text(rows(), "\t")
+CURVES = r"is a table of .*[Rr]adius.*belong to the section `measurements`"
+CURVE = [[str(k**power) for power in (1, 2, 3)] for k in range(1, 12)]
+REFUSED = [
+    (text([[*row, str(k)] for k, row in enumerate(rows())]), "last column"),
+    (text(with_coordinates(THIRDS, 1, 1, "y/x")), "'y/x' in line 1"),
+    (text(with_coordinates(THIRDS, 1, 1, ""), " "), "24 numbers in line 1 but 25"),
+    (IMAGE.format("Topography") + "\n" + IMAGE.format("Phase"), "2 blocks of rows, the second from line 34"),
+    (text(rows(write="{:.0f}".format), " ", ZYGO), "Zygo file without points"),
+    # Commas and points between digits, and blanks, of which there may be two kinds.
+    *((text(decimal("{:.2f}"), delimiter), "decimal") for delimiter in ", "),
+    (text(decimal("{:.1f}")), "decimal"),
+    (text(decimal("{:.3f}"), ", "), "decimal"),
+    *((text(rows(1e4 + 10 * HEIGHTS, "{:,.0f}".format), delimiter), "separate thousands") for delimiter in "\t;"),
+    *((text(thousands("."), delimiter), "that may separate thousands.*add a digit") for delimiter in "\t; "),
+    (text(thousands(".", 1000), "\t"), "that may separate thousands.*add a digit"),
+    *((text(thousands(blank), delimiter), BLANKS) for delimiter, blank in ("\t ", "; ", "\t\xa0", " \u202f")),
+    # Curves of a contact.
+    (text(CURVE, heading=["load (mN),contact radius (um),depth (nm)"]), CURVES),
+    (text(np.array(CURVE)[:, :2], heading=["Force [N],Radius [m]"]), CURVES),
+    # Damage.
+    (gzip.compress(CONTENT.encode())[:-200], "the file is damaged"),
+    (text([[f"L{k}", *row] for k, row in enumerate(rows())]), "'L0' in line 1, column 1"),
+    (text([["xxx", *row] for row in rows()], heading=["a,b", ""]), "'xxx' in line 3"),
+    (text(rows()).replace("\n", "]\n"), r"\]' in line 1, column 24"),
+    (text(rows()).replace("\n", '"\n', 1), "\"' in line 1, column 24"),
+]
+
+
+@pytest.mark.parametrize(("content", "words"), REFUSED, ids=lambda each: each if isinstance(each, str) else "")
+def test_texts_that_are_no_heights_or_can_be_read_in_two_ways_are_refused(tmp_path, content, words):
+    (tmp_path / "scan.txt").write_bytes(content if isinstance(content, bytes) else content.encode())
+    with refused("path", words):
+        read(tmp_path / "scan.txt", height_unit=None, size=None)
+
+
+@pytest.mark.parametrize(
+    ("fields", "delimiter"),
+    [
+        *((decimal("{:.3f}", HEIGHTS + 1e4), delimiter) for delimiter in "\t;"),
+        *((rows(), f" {delimiter} ") for delimiter in "\t; "),
+        (rows(write=lambda height: f"{height:.10E}".replace("E", "D")), " "),
+    ],
+)
+def test_numbers_as_programs_write_them(tmp_path, fields, delimiter):
+    assert_heights(read(written(tmp_path, text(fields, delimiter))))
 
 
 @pytest.mark.parametrize(
@@ -379,13 +357,6 @@ def test_points_of_nan_are_missing_points_of_a_grid(tmp_path, given):
     lines[0][2] = "3.5"
     with refused("path", "a height without coordinates"):
         read(written(tmp_path, text(lines, " "), "scan.xyz"), **given)
-
-
-@pytest.mark.parametrize("titles", ["load (mN),contact radius (um),depth (nm)", "Force [N],Radius [m]"])
-def test_measurements_of_a_contact_are_no_topography(tmp_path, titles):
-    lines = [[str(k**power) for power in range(1, titles.count(",") + 2)] for k in range(1, 12)]
-    with refused("path", r"is a table of .*[Rr]adius.*belong to the section `measurements`"):
-        read(written(tmp_path, text(lines, ",", [titles])))
 
 
 @pytest.mark.parametrize("titles", ["row,col,z", "x_1,y_1,z_raw"])
