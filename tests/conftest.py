@@ -1,6 +1,7 @@
-"""Calls of Snakemake, and the campaign `smoke`, which runs once for all tests of the workflow."""
+"""Configurations, calls of Snakemake, and the campaign `smoke`, which runs once for all tests of the workflow."""
 
 import contextlib
+import copy
 import fcntl
 import gc
 import os
@@ -18,6 +19,8 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 import pytest
+import yaml
+from demo_configuration import GOOD
 from hypothesis import settings
 from snakemake_calls import call_snakemake
 
@@ -120,6 +123,30 @@ def copy_project(source, target, changed=()):
     for command in (["init", "--quiet"], ["add", "."], ["commit", "--quiet", "--message", "A copy"]):
         subprocess.run(["git", *command], cwd=target, env=os.environ | variables, check=True)
     return target
+
+
+@pytest.fixture
+def load(tmp_path):
+    """Load GOOD with values changed at dotted keys (`None` as a value deletes the key)."""
+
+    from icha.configuration.load import load_configuration
+
+    def loaded(changes=None, overrides=None, text=GOOD, **options):
+        content = yaml.safe_load(text)
+        for key, value in copy.deepcopy(changes or {}).items():
+            *path, last = key.split(".")
+            inside = content
+            for part in path:
+                inside = inside[int(part) if isinstance(inside, list) else part]
+            if value is None:
+                del inside[last]
+            else:
+                inside[int(last) if isinstance(inside, list) else last] = value
+        file = tmp_path / "campaign.yaml"
+        file.write_text(yaml.safe_dump(content, sort_keys=False))
+        return load_configuration(file, overrides, **options)
+
+    return loaded
 
 
 @pytest.fixture(scope="session")

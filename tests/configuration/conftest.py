@@ -1,35 +1,10 @@
-"""Configurations to load, right ones and wrong ones."""
+"""Configurations that are refused."""
 
 import re
 
 import pytest
-import yaml
-from demo_configuration import GOOD
 
 from icha.configuration.errors import ConfigurationError
-from icha.configuration.load import load_configuration
-
-
-@pytest.fixture
-def load(tmp_path):
-    """Load GOOD with values changed at dotted keys (`None` as a value deletes the key)."""
-
-    def loaded(changes=None, overrides=None, text=GOOD):
-        content = yaml.safe_load(text)
-        for key, value in (changes or {}).items():
-            *path, last = key.split(".")
-            inside = content
-            for part in path:
-                inside = inside[int(part) if isinstance(inside, list) else part]
-            if value is None:
-                del inside[last]
-            else:
-                inside[int(last) if isinstance(inside, list) else last] = value
-        file = tmp_path / "campaign.yaml"
-        file.write_text(yaml.safe_dump(content, sort_keys=False))
-        return load_configuration(file, overrides)
-
-    return loaded
 
 
 @pytest.fixture

@@ -71,20 +71,6 @@ def test_the_thickness_of_a_layer_is_varied(load):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"surfaces.rough.shape": {"sphere": {"radius": "1 mm"}, "cone": {"half_angle": "80 deg"}}}, "given: cone, sp"),
-        ({"surfaces.rough.shape": {"spheres": {"radius": "1 mm"}}}, "unknown key (did you mean 'sphere'?)"),
-        ({"surfaces.rough.shape": {"cone": {"half_angle": "95 deg"}}}, "shape.cone.half_angle: '95 deg' is out of ra"),
-        ({"surfaces.rough.shape": {"cylinder_punch": {"radius": "0.1 um"}}}, "is smaller than a grid cell of 1.25 um"),
-        ({"surfaces.ball": BALL | {"period": "1 mm"}}, "surfaces.ball.period: unknown key"),
-    ],
-)
-def test_wrong_shapes_are_refused(changes, message, refused):
-    refused("", changes, message)
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
         # Radius of JKR at the indentation 0: a^3 = 2 pi w R^2/E*, with 50 mJ/m^2, 10 mm and 25 MPa.
         (
             {"surfaces.ball.shape": {"sphere": {"radius": "10 mm"}}},

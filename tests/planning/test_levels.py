@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-import pytest
 import xarray as xr
 
 from icha.configuration.load import load_configuration
@@ -85,38 +84,21 @@ def test_areas_as_targets_ask_for_the_pressure():
     assert choose_for_study("load", study, [pressure, pressure], COSTS, 1).quantity == "nominal_pressure"
 
 
-CAMPAIGN = """
-name: demo
-title: A title
-summary: A summary
-license: CC-BY-4.0
-surfaces:
-  rough: {kind: self_affine, period: 100 um, rolloff_wavelength: 25 um, short_wavelength: 10 um, hurst: 0.8, grid: 80}
-materials:
-  soft: {contact_modulus: 25 MPa, surface_energy: 0 mJ/m^2}
-studies:
-  one: &one {surfaces: [rough], rms_slopes: [1], materials: [soft], targets: {reduced_pressures: [0.01]}, accuracy: 3 %}
-  two: *one
-"""
-
-
-@pytest.fixture
-def load(tmp_path):
-    def read(text=CAMPAIGN):
-        (tmp_path / "demo.yaml").write_text(text)
-        return load_configuration(tmp_path / "demo.yaml", results=tmp_path / "results")
-
-    return read
-
-
 def test_written_levels_replace_the_pilot_and_are_in_the_configuration_as_used(load, tmp_path):
-    assert all(load().campaign.studies[name].seeds_of_levels == PILOT for name in ("one", "two"))
+    study = {"surfaces": ["rough"], "rms_slopes": [1], "materials": ["soft"]}
+    study |= {"targets": {"reduced_pressures": [0.01]}, "accuracy": "3 %"}
+
+    def read(**changes):
+        both = {"studies": {name: study | changes for name in ("one", "two")}}
+        return load(both | {"materials.soft.surface_energy": "0 J/m^2"}, results=tmp_path / "results")
+
+    assert all(read().campaign.studies[name].seeds_of_levels == PILOT for name in ("one", "two"))
     results = tmp_path / "results/demo"
     results.mkdir(parents=True)
     chosen = choice("4 %", THREE, TWO)
     write_levels(results, {"one": chosen})
     write_levels(results, {"two": chosen._replace(counts={"coarse": 9, "fine": 3})})
-    configuration = load()
+    configuration = read()
     campaign = configuration.campaign
     assert len(campaign.studies["one"].seeds) == chosen.counts["asperities"]
     assert campaign.studies["two"].models == ["boundary_elements"] and campaign.studies["two"].seeds == [1, 2, 3]
@@ -125,7 +107,7 @@ def test_written_levels_replace_the_pilot_and_are_in_the_configuration_as_used(l
     (tmp_path / "used.yaml").write_text(configuration.text)
     assert load_configuration(tmp_path / "used.yaml").campaign == campaign
     # Without the key, the file has no effect.
-    plain = load(CAMPAIGN.replace(", accuracy: 3 %", "")).campaign
+    plain = read(accuracy=None).campaign
     assert plain.studies["one"].levels is None
 
 

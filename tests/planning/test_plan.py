@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import yaml
 from conftest import REPOSITORY
+from demo_configuration import file_surface, measured_surface
 
 from icha.configuration.load import load_configuration
 from icha.planning.batches import figure_batches, run_batches
@@ -16,47 +17,41 @@ from icha.surfaces.measured.topography import prepared_topography
 from icha.surfaces.summits import find_summits
 
 GB = 1e9
-CAMPAIGN = """
-name: scanned
-title: Scanned
-summary: For tests.
-license: CC0-1.0
-confirmed: [surfaces.scan.grid, surfaces.map.path]
-surfaces:
-  rough: {kind: self_affine, period: 100 um, rolloff_wavelength: 40 um, short_wavelength: 14.3 um, hurst: 0.8, grid: 32}
-  scan: {kind: measured, path: scan.npy, size: 50 um, height_unit: um, boundary: window}
-  map: {kind: file, path: map.npy, period: 50 um, height_unit: um}
-materials:
-  bare: {contact_modulus: 25 MPa, surface_energy: 0 mJ/m^2, interaction_range: 2 nm}
-  soft: {contact_modulus: 25 MPa, surface_energy: 50 mJ/m^2, interaction_range: 2 nm}
-studies:
-  load:
-    surfaces: [rough, scan, map]
-    seeds: [1]
-    rms_slopes: [1.0]
-    materials: [bare, soft]
-    targets: {reduced_pressures: [1.0e-3, 1.0e-2]}
-figures:
-  fig2_area_and_gap: {study: load}
-"""
+# Surfaces of all kinds with two materials, in one study and a figure.
+CHANGES = {
+    "confirmed": ["surfaces.scan.grid", "surfaces.map.path"],
+    "surfaces.scan": measured_surface(path="scan.npy", size="50 um", height_unit="um"),
+    "surfaces.map": file_surface("map.npy") | {"period": "50 um"},
+    "materials.bare": {"contact_modulus": "25 MPa", "surface_energy": "0 mJ/m^2"},
+    "studies.one": {
+        "surfaces": ["rough", "scan", "map"],
+        "seeds": [1],
+        "rms_slopes": [1.0],
+        "materials": ["bare", "soft"],
+        "targets": {"reduced_pressures": [1e-3, 1e-2]},
+    },
+    "figures": {"fig2_area_and_gap": {"study": "one"}},
+}
+# The study of the random surface alone.
+ROUGH = CHANGES | {"confirmed": [], "studies.one.surfaces": ["rough"], "figures": {}}
 
 
 @pytest.fixture
-def campaign(tmp_path):
+def read(load, tmp_path):
     heights = np.random.default_rng(1).normal(size=(40, 40))
     np.save(tmp_path / "scan.npy", heights)
     np.save(tmp_path / "map.npy", heights[:30, :30])
-    (tmp_path / "scanned.yaml").write_text(CAMPAIGN)
-    return load_configuration(tmp_path / "scanned.yaml").campaign
+    return lambda changes: load(changes).campaign
 
 
-def test_tensile_targets_have_a_cost(tmp_path):
-    text = CAMPAIGN.replace("[rough, scan, map]", "[rough]").replace("[bare, soft]", "[soft]")
-    text = text.replace("reduced_pressures: [1.0e-3, 1.0e-2]", "pressures: [-10 kPa]").replace("map.npy", "scan.npy")
-    (tmp_path / "scanned.yaml").write_text(text)
-    np.save(tmp_path / "scan.npy", np.random.default_rng(1).normal(size=(40, 40)))
-    items = plan(load_configuration(tmp_path / "scanned.yaml").campaign, tmp_path)
-    assert all(item.cost.seconds > 0 for item in items if item.part == RUNS)
+@pytest.fixture
+def campaign(read):
+    return read(CHANGES)
+
+
+def test_tensile_targets_have_a_cost(read, tmp_path):
+    campaign = read(ROUGH | {"studies.one.materials": ["soft"], "studies.one.targets": {"pressures": ["-10 kPa"]}})
+    assert all(item.cost.seconds > 0 for item in plan(campaign, tmp_path) if item.part == RUNS)
 
 
 def test_the_summits_of_a_measured_surface_are_counted_in_its_file(campaign):
@@ -87,7 +82,7 @@ def test_targets_need_a_part_of_the_files(campaign, tmp_path):
     items, files = plan(campaign, tmp_path), campaign_files(campaign)
     assert {item.path for item in needed_for(["runs", "--forceall"], items)} == {*files.surfaces, *files.runs}
     assert files.dataset in {item.path for item in needed_for(["dataset"], items)}
-    assert [item.path for item in needed_for([f"results/scanned/{files.report}"], items)] == [files.report]
+    assert [item.path for item in needed_for([f"results/demo/{files.report}"], items)] == [files.report]
     assert needed_for([], items) == needed_for(["--forceall"], items) == needed_for(["runs", "all"], items) == items
 
 
@@ -99,13 +94,10 @@ def test_targets_need_a_part_of_the_surfaces_runs_and_theories(campaign):
         assert needed_files(files, targets) == {*files.surfaces, *files.runs, *files.theories}
 
 
-def test_new_seeds_at_the_end_change_only_the_last_batch(tmp_path):
-    content = yaml.safe_load(CAMPAIGN) | {"figures": {}, "confirmed": []}
+def test_new_seeds_at_the_end_change_only_the_last_batch(read):
     before = []
     for seeds in (3, 40, 41, 400):
-        content["studies"]["load"] |= {"surfaces": ["rough"], "seeds": f"1..{seeds}"}
-        (tmp_path / "seeds.yaml").write_text(yaml.safe_dump(content))
-        campaign = load_configuration(tmp_path / "seeds.yaml").campaign
+        campaign = read(ROUGH | {"studies.one.seeds": f"1..{seeds}"})
         batches = run_batches(campaign, campaign_files(campaign).runs)
         assert batches[: len(before) - 1] == before[:-1] and all(batch.seconds <= BATCH for batch in batches)
         assert sum(len(batch.files) for batch in batches) == 2 * seeds
@@ -126,7 +118,7 @@ def test_times_of_finished_runs_correct_the_times_of_their_study(campaign, tmp_p
         return {item.path: item.cost.seconds for item in plan(campaign, tmp_path) if item.part == RUNS}
 
     before, path = seconds(), next(iter(campaign_files(campaign).runs))
-    log = tmp_path / "logs/runs/load_asperities_0.log"
+    log = tmp_path / "logs/runs/one_asperities_0.log"
     log.parent.mkdir(parents=True)
     log.write_text(f"{campaign.name}/{path.removesuffix('.nc')}: computed in {4 * before[path]} s\n")
     assert seconds() == pytest.approx({path: 2 * each for path, each in before.items()})
@@ -168,12 +160,9 @@ def test_a_lack_of_memory_or_disk_space_is_reported(monkeypatch, tmp_path):
     assert find_shortages([item("a"), item("b", state=DONE)], 1, tmp_path) == []
 
 
-def test_boundary_elements_use_one_core_and_save_checkpoints_on_large_grids(tmp_path):
-    content = yaml.safe_load(CAMPAIGN) | {"figures": {}, "confirmed": []}
-    content["surfaces"] = {"rough": content["surfaces"]["rough"] | {"grid": 2048}}
-    content["studies"]["load"] |= {"surfaces": ["rough"], "models": ["asperities", "boundary_elements"]}
-    (tmp_path / "large.yaml").write_text(yaml.safe_dump(content))
-    campaign = load_configuration(tmp_path / "large.yaml").campaign
+def test_boundary_elements_use_one_core_and_save_checkpoints_on_large_grids(read):
+    both = {"studies.one.models": ["asperities", "boundary_elements"]}
+    campaign = read(ROUGH | both | {"surfaces.rough.grid": 2048})
     threads = {case.model: run_threads(campaign, case) for case in campaign_files(campaign).runs.values()}
     resumable = {case.model: is_resumable(campaign, case) for case in campaign_files(campaign).runs.values()}
     assert threads == {"asperities": 2, "boundary_elements": 1}
