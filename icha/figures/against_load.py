@@ -62,8 +62,8 @@ def area_and_gap(
     panels = Panel("reduced_pressure", "area_over_load"), Panel("reduced_pressure", curves.gap_name(dataset))
     if physical:
         panels = [panel_in_units("nominal_pressure", y, dataset) for y in ("contact_area_fraction", "mean_gap")]
-    truths = {} if physical else {truth.runs.contact: truth for truth in shown.crosses}
-    compared = [(line, truths[line.runs.contact]) for line in shown.lines if line.runs.contact in truths]
+    truths = {} if physical else {truth.runs.line.contact: truth for truth in shown.crosses}
+    compared = [(line, truths[line.runs.line.contact]) for line in shown.lines if line.runs.line.contact in truths]
     fig, axes = new_panels(4.5, 2, sharex=True, height_ratios=(1, _LOWER)) if compared else new_panels(3.3)
     left, right = axes[0]
     (loads, areas), (_, gaps) = (
@@ -183,11 +183,11 @@ def _draw_differences(axes, shown, compared, gap):
         logarithmic_axes(ax, "x")
         ax.axhline(0, color="0.6", lw=0.6, zorder=0)
         ax.set_ylabel(rf"${quantity(error).symbol}$  (%)")
-    bare = {truth.runs.contact[1:]: truth.runs.by_seed for _, truth in compared if not truth.runs.surface_energy}
+    bare = {truth.runs.line.place: truth.runs.by_seed for _, truth in compared if not truth.runs.surface_energy}
     adhesive = [truth for _, truth in compared if truth.runs.surface_energy]
     for truth in adhesive:
         seed = next(iter(truth.stops))
-        without = bare.get(truth.runs.contact[1:], {}).get(seed)
+        without = bare.get(truth.runs.line.place, {}).get(seed)
         states = None if without is None else _estimate(without, truth.runs.by_seed[seed])
         for ax, panel in zip(axes, errors if states else (), strict=False):
             colour = shown.looks.material_colour(truth.runs.labels.material)

@@ -14,7 +14,6 @@ from icha.analysis.model_error import state_of
 from icha.asperity.material import WU_HOLDS_FROM
 from icha.asperity.tabor import sphere_pull_off_factor
 from icha.contact.attraction import FINITE_RANGE, SHORT_RANGE
-from icha.contact.models import MODELS, REFERENCE_MODEL
 from icha.datasets.campaign import find_snapshot
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import LOSS_PARTS, label_of
@@ -33,6 +32,7 @@ from icha.figures.looks import (
 )
 from icha.figures.select import (
     ContactRuns,
+    Line,
     NothingToDraw,
     group_by_contact,
     has_shape,
@@ -66,40 +66,39 @@ def tabor(campaign: xr.DataTree, *, study: str, kind: str | None = None, target:
     if all(float(run.get("pull_off_force_over_jkr", 0)) and run["short_wavelength"] == np.inf for _, run in runs):
         return _pull_off_of_spheres([run for _, run in runs])
     groups = group_by_contact(campaign, runs)
-    run = next(iter(groups[-1].by_seed.values()))
-    shown = snapshot_label(run, find_snapshot(run, kind, target))
+    shown = snapshot_label(groups[-1].first, find_snapshot(groups[-1].first, kind, target))
     # Materials that differ only in the range of attraction form one line with the name of the first material.
     materials: dict[tuple, str] = {}
-    curves: dict[tuple, list[ContactRuns]] = {}
-    bare: dict[tuple, list[ContactRuns]] = {}
+    curves: dict[Line, list[ContactRuns]] = {}
+    bare: dict[Line, list[ContactRuns]] = {}
     for group in groups:
         states = {seed: state_of(run, find_snapshot(run, kind, target)) for seed, run in group.by_seed.items()}
         group = group._replace(by_seed=states)
-        modulus, energy = (float(next(iter(states.values()))[name]) for name in ("contact_modulus", "surface_energy"))
-        contact = (materials.setdefault((modulus, energy), group.labels.material), *group.contact[1:])
-        if energy > 0:
-            curves.setdefault((contact, group.applicable), []).append(group)
-        elif group.applicable:
-            bare.setdefault(contact, []).append(group)
+        of_material = float(group.first["contact_modulus"]), group.surface_energy
+        line = group.line._replace(material=materials.setdefault(of_material, group.labels.material))
+        if group.surface_energy > 0:
+            curves.setdefault(line, []).append(group)
+        elif not group.doubt:
+            bare.setdefault(line, []).append(group)
     if not curves:
         raise NothingToDraw(f"study {study}: no run with adhesion is complete; the figure needs a surface energy")
 
     # The name of a material has no range of attraction, because lines of different ranges are one line.
-    looks = Looks(campaign, [study], [contact for contact, _ in curves], only_drawn=True)
+    looks = Looks(campaign, [study], curves, only_drawn=True)
     fig, [panels] = new_panels(3.1)
     quantities = ("contact_area_fraction", gap_name(campaign[study].to_dataset()))
     say(fig, _RANGES, _TABOR)
     drawn = []
-    for (contact, applicable), line in curves.items():
-        points = Points(line, "tabor_parameter", *quantities)
+    for line, found in curves.items():
+        points = Points(found, "tabor_parameter", *quantities)
         for number, ax in enumerate(panels, 1):
-            points.draw(ax, looks.look(contact, applicable=applicable), number)
+            points.draw(ax, looks.look(line), number)
         drawn += points.means[0].tolist()
-    for k, (contact, line) in enumerate(bare.items()):
-        look = {"color": looks.colour(contact) if looks.by_place else GREY, "label": None if k else "no adhesion"}
+    for k, (line, found) in enumerate(bare.items()):
+        look = {"color": looks.colour(line) if looks.by_place else GREY, "label": None if k else "no adhesion"}
         for ax, name in zip(panels, quantities, strict=True):
-            mean = np.mean([float(state[name]) for group in line for state in group.by_seed.values()])
-            record(ax, [min(drawn), max(drawn)], [mean, mean], line[0].drawn_name)
+            mean = np.mean([float(state[name]) for group in found for state in group.by_seed.values()])
+            record(ax, [min(drawn), max(drawn)], [mean, mean], found[0].drawn_name)
             ax.axhline(mean, ls=(0, (5, 2)), lw=1, zorder=1, **look)
     for ax, name in zip(panels, quantities, strict=True):
         if max(drawn) > _TABOR_SPAN * min(drawn):
@@ -185,15 +184,15 @@ _Y = "pull_off_pressure"
 def pull_off(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = ()) -> Figure:
     """Draw the pull-off pressure (mean over the seeds) against slope, and against the largest load of the path."""
     studies = list(dict.fromkeys([study, *load_studies]))
-    by_slope = select_detached_lines(campaign, [study], quantity=_Y, along_slopes=True, both_models=True)
-    by_load = select_detached_lines(campaign, list(dict.fromkeys(load_studies)), quantity=_Y, both_models=True)
-    points = list(itertools.chain(*by_slope.values(), *by_load.values()))
-    if len({point.labels.rms_slope for point in points}) == 1:  # the same markers in both panels
-        by_load = {((*contact[:2], None), *of): line for (contact, *of), line in by_load.items()}
-    models = _models_of(points)
-    keys = [*by_slope, *by_load]
-    looks = Looks(campaign, studies, [contact for contact, *_ in keys], by_place=None, crosses=len(models) > 1)
-    factor, unit = choose_unit(max(float(run[_Y]) for point in points for run in point.by_seed.values()), "Pa")
+    by_slope = select_detached_lines(campaign, [study], _Y, along_slopes=True)
+    by_load = select_detached_lines(campaign, list(dict.fromkeys(load_studies)), _Y)
+    groups = list(itertools.chain(*by_slope.values(), *by_load.values()))
+    if len({group.labels.rms_slope for group in groups}) == 1:  # the same markers in both panels
+        by_load = {line._replace(rms_slope=None): found for line, found in by_load.items()}
+    lines = [*by_slope, *by_load]
+    looks = Looks(campaign, studies, lines, by_place=None)
+    runs = [run for group in groups for run in group.by_seed.values()]
+    factor, unit = choose_unit(max(float(run[_Y]) for run in runs), "Pa")
 
     fig, [panels] = new_panels(2.9, columns=2 if by_load else 1, width=TWO_COLUMNS if by_load else ONE_COLUMN)
     second = " (a) and against the largest reduced pressure F/(E* h'rms A0) of the path (b)" if by_load else ""
@@ -203,35 +202,32 @@ def pull_off(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] =
         the largest nominal tension in unloading.""",
     )
     for ax, x, drawn in zip(panels, ("rms_slope", "largest_reduced_pressure"), (by_slope, by_load), strict=False):
-        lines = {key: Points(line, x, _Y, factor=factor) for key, line in drawn.items()}
-        spread = _spread([line.means[0] for line in lines.values()])
-        for position, ((contact, applicable, model), line) in enumerate(lines.items()):
-            if len(models) > 1 and model == REFERENCE_MODEL:
-                look = looks.cross(contact, applicable=applicable, shape=_OBLIQUE) | _TRUTH
-            else:
-                look = looks.look(contact, applicable=applicable, model=model) | _LINE
+        points = {line: Points(found, x, _Y, factor=factor) for line, found in drawn.items()}
+        spread = _spread([each.means[0] for each in points.values()])
+        for position, (line, each) in enumerate(points.items()):
+            beside = looks.is_beside(line)
+            look = looks.cross(line, shape=_OBLIQUE) | _TRUTH if beside else looks.look(line) | _LINE
             look["ms"] *= _SMALLER
-            line.draw(ax, look, shift=spread ** ((position + 0.5) / len(lines) - 0.5))
-        loads, values = np.concatenate([line.means for line in lines.values()], axis=1)
+            each.draw(ax, look, shift=spread ** ((position + 0.5) / len(points) - 0.5))
+        loads, values = np.concatenate([each.means for each in points.values()], axis=1)
         _scale_pull_off(ax, values)
         ax.set(xlabel=label_of(x), ylabel=label_of(_Y, unit))
-    _scale_slopes(panels[0], sorted({point.labels.rms_slope for line in by_slope.values() for point in line}))
+    _scale_slopes(panels[0], sorted({group.labels.rms_slope for found in by_slope.values() for group in found}))
     if by_load and loads.min() > 0:
         logarithmic_axes(panels[1], "x")
         panels[1].set_xlim(loads.min() / 1.6, loads.max() * 1.6)
     handles = looks.handles(**_LINE)
-    if len(models) > 1:
+    if crossed := list(filter(looks.is_beside, lines)):
         handles = looks.colour_handles() if looks.by_place else handles
         handles |= {ASPERITIES_NAME: model_handle(ASPERITIES_NAME, **_LINE | looks.fill())}
-        crossed = [contact for contact, _, model in keys if model == REFERENCE_MODEL]
         several = any(map(looks.rank, crossed))
-        for contact in crossed:
-            words = [REFERENCE_NAME, *([looks.shape_name(contact)] if several else [])]
-            look = {"marker": looks.cross(contact, shape=_OBLIQUE)["marker"]} | _TRUTH
-            handles[", ".join(words)] = model_handle(REFERENCE_NAME, **look)
+        for line in crossed:
+            name = f"{REFERENCE_NAME}, {looks.shape_name(line)}" if several else REFERENCE_NAME
+            look = {"marker": looks.cross(line, shape=_OBLIQUE)["marker"]} | _TRUTH
+            handles[name] = model_handle(REFERENCE_NAME, **look)
     say(
         fig,
-        range_of_attraction(attractions_of(run for point in points for run in point.by_seed.values())),
+        range_of_attraction(attractions_of(runs)),
         "Points at one slope or load are drawn side by side; lines guide the eye.",
         """The pull-off force of a shape is the pull-off pressure times the area of the square; it is the variable
         `pull_off_force`."""
@@ -239,15 +235,10 @@ def pull_off(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] =
         else "",
         grid_of_loops(campaign, studies),
     )
-    title = [models[0] if len(models) == 1 else None, looks.heading()]
+    title = [*([] if crossed else looks.models), looks.heading()]
     panels[0].set_title(", ".join(filter(None, title)), loc="right", fontsize=8)
     legend_below(fig, handles)
     return fig
-
-
-def _models_of(points):
-    """Return the names of the models of some runs in legends and titles."""
-    return list(dict.fromkeys(MODELS[point.labels.model].words for point in points))
 
 
 def _scale_pull_off(ax, values):
@@ -320,18 +311,15 @@ the loss."""
 def loss(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
     """Draw the loss of runs with adhesion (mean over the seeds), and the parts of this loss by cause."""
     studies = list(dict.fromkeys(studies))
-    runs = select_detached_lines(campaign, studies, quantity="hysteresis_loss", both_models=True)
-    runs = {key: line for key, line in runs.items() if line[0].surface_energy > 0}
-    if not runs:
+    lines = select_detached_lines(campaign, studies, "hysteresis_loss")
+    lines = {line: found for line, found in lines.items() if found[0].surface_energy > 0}
+    if not lines:
         raise NothingToDraw(f"studies {', '.join(studies)}: no run with adhesion; the figure needs a surface energy")
-    several = len({model for *_, model in runs}) > 1
-    looks = Looks(campaign, studies, [contact for contact, *_ in runs], by_place=None, crosses=several)
-    truths = {key: line for key, line in runs.items() if several and key[-1] == REFERENCE_MODEL}
-    lines = {key: line for key, line in runs.items() if key not in truths}
-
+    looks = Looks(campaign, studies, lines, by_place=None)
+    truths = {line: lines[line] for line in lines if looks.is_beside(line)}
+    lines = {line: found for line, found in lines.items() if line not in truths} | truths
+    runs = [run for group in itertools.chain(*lines.values()) for run in group.by_seed.values()]
     fig, [(left, right)] = new_panels(3.1, width_ratios=(1.25, 1))
-    every = list(itertools.chain(*lines.values(), *truths.values()))
-    models = _models_of(every)
     say(
         fig,
         """Hysteresis loss of runs with adhesion, divided by the surface energy, against the largest contact area on the
@@ -339,16 +327,16 @@ def loss(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
         first contact to the largest load and back to complete separation.""",
         """With boundary elements, steps add an error of at most 0.1 % of the largest work done in loading; the error of
         the grid is larger."""
-        if models != [ASPERITIES_NAME]
+        if looks.models != [ASPERITIES_NAME]
         else "",
-        range_of_attraction(attractions_of(run for group in every for run in group.by_seed.values())),
+        range_of_attraction(attractions_of(runs)),
     )
-    handles = _draw_losses(left, lines, truths, looks)
+    handles = _draw_losses(left, lines, looks)
     if truths:
-        names = {ASPERITIES_NAME: looks.fill(), REFERENCE_NAME: {}}
-        handles |= {name: model_handle(name, **look) for name, look in names.items()}
+        handles |= {ASPERITIES_NAME: model_handle(ASPERITIES_NAME, **looks.fill())}
+        handles |= {REFERENCE_NAME: model_handle(REFERENCE_NAME)}
     else:
-        left.set_title(", ".join(models), loc="right")
+        left.set_title(looks.models[0], loc="right")
     say(
         fig,
         """Panel (b) shows the causes of the loss at the largest load of every series of panel (a), with the marker of
@@ -358,38 +346,34 @@ def loss(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
         "Where the asperity model has the same series as boundary elements, the causes are those of the asperity model."
         if truths
         else "",
+        grid_of_loops(campaign, studies),
     )
-    compared = {contact for contact, *_ in lines}
-    alone = {key: line for key, line in truths.items() if key[0] not in compared}
-    shown = _draw_parts(right, lines | alone, {key: _look_of_loss(looks, key, truths) for key in runs}, looks)
-    say(fig, grid_of_loops(campaign, studies))
+    compared = {line.contact for line in lines if line not in truths}
+    alone = {line: found for line, found in lines.items() if line not in truths or line.contact not in compared}
+    shown = _draw_parts(right, alone, looks)
     handles |= {label_of(name): Patch(ec="black", lw=0.5, **PARTS[name]) for name in shown}
     legend_below(fig, handles, looks.heading())
     return fig
 
 
-def _draw_losses(ax, runs, truths, looks):
-    """Draw the losses of runs with fits, and boundary elements; return legend entries."""
-    drawn = {key: Points(line, *_LOSS) for key, line in (runs | truths).items()}
+def _draw_losses(ax, lines, looks):
+    """Draw the losses of all lines with fits; return legend entries."""
+    drawn = {line: Points(found, *_LOSS) for line, found in lines.items()}
     handles = looks.handles(ls="none") if looks.many else {}
-    for key, line in drawn.items():
-        contact, applicable, _ = key
-        handle = line.draw(ax, _look_of_loss(looks, key, truths))
-        if key in truths and not looks.many:
-            handles.setdefault(looks.name(contact), handle)
-        if key in truths or not applicable:
-            continue
-        (x, y), words = line.means, ""
-        if line.same_seeds and len(np.unique(x)) >= _LEAST_POINTS:
+    for line, points in drawn.items():
+        handle, name = points.draw(ax, _look_of_loss(looks, line)), looks.name(line)
+        (x, y), words = points.means, ""
+        fitted = not (looks.is_beside(line) or line.doubt)
+        if fitted and points.same_seeds and len(np.unique(x)) >= _LEAST_POINTS:
             along = np.linspace(x.min(), x.max(), _FIT_POINTS)
             values, r_squared, exponent = fit_line(x, y, along)
             say(ax, _FIT)
             words = f": $r^2$ = {r_squared:.4f}, exponent {exponent:.2f}"
-            look = {"color": looks.colour(contact), "lw": 0.9, "zorder": 2}
-            plot(ax, along, values, line.name._replace(curve="fitted line"), **look)
-        if not looks.many:
-            handles[looks.name(contact) + words] = handle
-    means = np.concatenate([line.means for line in drawn.values()], axis=1)
+            look = {"color": looks.colour(line), "lw": 0.9, "zorder": 2}
+            plot(ax, along, values, points.name._replace(curve="fitted line"), **look)
+        if not looks.many and (fitted or looks.is_beside(line)):
+            handles.setdefault(name + words, handle)
+    means = np.concatenate([points.means for points in drawn.values()], axis=1)
     if all(values.min() > 0 and values.max() > _LOSS_SPAN * values.min() for values in means):
         logarithmic_axes(ax)
     ax.axhline(0, color=GREY, lw=0.6, zorder=1)
@@ -397,12 +381,9 @@ def _draw_losses(ax, runs, truths, looks):
     return handles
 
 
-def _look_of_loss(looks, key, truths):
-    """Return the look of the markers of a series: crosses of boundary elements beside another model."""
-    contact, applicable, model = key
-    if key in truths:
-        return looks.cross(contact, applicable=applicable)
-    return looks.look(contact, applicable=applicable, model=model) | {"ls": "none"}
+def _look_of_loss(looks, line):
+    """Return the look of the markers of a line: crosses of boundary elements beside another model."""
+    return looks.cross(line) if looks.is_beside(line) else looks.look(line) | {"ls": "none"}
 
 
 def fit_line(x: np.ndarray, y: np.ndarray, along: np.ndarray) -> tuple[np.ndarray, float, float]:
@@ -422,26 +403,24 @@ def shares(line: Sequence[ContactRuns]) -> dict[str, float]:
     return dict(zip(PARTS, parts / total if total > 0 else parts, strict=True))
 
 
-def _draw_parts(ax, runs, markers, looks):
-    """Draw the parts of the loss of every line as a stacked bar; return the names of the drawn parts.
-
-    markers : look of the marker of each line.
-    """
-    bars = {key: shares(line) for key, line in runs.items()}
+def _draw_parts(ax, lines, looks):
+    """Draw the parts of the loss of every line as a stacked bar; return the names of the drawn parts."""
+    bars = {line: shares(found) for line, found in lines.items()}
     shown = [name for name in PARTS if any(abs(bar[name]) >= _LEAST_SHARE for bar in bars.values())]
-    for position, (key, bar) in enumerate(bars.items()):
-        (contact, applicable, model), above, below = key, 0.0, 0.0
+    for position, (line, bar) in enumerate(bars.items()):
+        above, below = 0.0, 0.0
         for name in shown:
             share = 100 * bar[name]
-            part = Name(label_of(name), RunLabels(None, model, contact[1], None, contact[2], contact[0]))
-            record(ax, [position], [share], part)
-            bar_look = {"ec": "black", "lw": 0.4, "alpha": None if applicable else _PALE} | PARTS[name]
+            labels = RunLabels(None, line.model, line.surface, None, line.rms_slope, line.material)
+            record(ax, [position], [share], Name(label_of(name), labels))
+            bar_look = {"ec": "black", "lw": 0.4, "alpha": _PALE if line.doubt else None} | PARTS[name]
             ax.bar(position, share, 0.8, bottom=above if share > 0 else below, **bar_look)
             above, below = above + max(share, 0), below + min(share, 0)
-        ax.plot(position, -0.055, transform=ax.get_xaxis_transform(), clip_on=False, **markers[key])
+        look = _look_of_loss(looks, line)
+        ax.plot(position, -0.055, transform=ax.get_xaxis_transform(), clip_on=False, **look)
     ax.axhline(0, color="black", lw=0.6)
     ax.set(xlim=(-0.7, len(bars) - 0.3), ylabel="share of losses and gains (%)")
-    ax.set_xticks(range(len(bars)), [looks.place_name(tuple(place)) for (_, *place), *_ in bars], rotation=90)
+    ax.set_xticks(range(len(bars)), [looks.place_name(line.place) for line in bars], rotation=90)
     ax.tick_params("x", length=0, pad=14, labelsize=7)
     ax.set_xlabel("series of (a), at their largest load", labelpad=2)
     return shown

@@ -26,9 +26,9 @@ from icha.uncertainty.ensembles import ENOUGH
 def _begin(campaign, study, lines):
     """Return the looks of a figure of some snapshots, and arguments of `Axes.plot` for the line of each snapshot."""
     groups = [line.runs for line in lines]
-    looks = Looks(campaign, [study], [group.contact for group in groups])
+    looks = Looks(campaign, [study], [group.line for group in groups])
     shape = {"ls": "-", "marker": MODEL_MARKERS[groups[0].model_name]}
-    return looks, [looks.look(group.contact, applicable=group.applicable) | shape for group in groups]
+    return looks, [looks.look(group.line) | shape for group in groups]
 
 
 def _draw(ax, lines, line, look, own, true, **truth_look):
@@ -98,7 +98,7 @@ def distributions(campaign: xr.DataTree, *, study: str, kind: str | None = None,
         )
         for ax, own, true in ((left, gaps, true_gaps), (right, pressures, true_pressures)):
             every = 1 + len(true[0]) // _BESIDE_MARKERS if true else 1
-            beside = {"color": looks.colour(line.runs.contact), "marker": MODEL_MARKERS[REFERENCE_NAME]}
+            beside = {"color": looks.colour(line.runs.line), "marker": MODEL_MARKERS[REFERENCE_NAME]}
             _draw(ax, lines, line, look, own, true, markevery=every, **beside)
         floor = drop_rounding_errors(gaps[1].mean(axis=0)).min(initial=floor)
         density = pressures[1].mean(axis=0)
@@ -235,7 +235,7 @@ def patch_sizes(campaign: xr.DataTree, *, study: str, kind: str | None = None, t
         smooth = look | {"marker": "none", "lw": 1.4 * look["lw"]}
         drawn = [(patch_density, look, MODEL_MARKERS[REFERENCE_NAME]), (patches_above, smooth, "none")]
         for ax, (points, line_look, marker) in zip(panels, drawn[-len(panels) :], strict=True):
-            beside = {"color": looks.colour(line.runs.contact), "marker": marker}
+            beside = {"color": looks.colour(line.runs.line), "marker": marker}
             _draw(ax, lines, line, line_look, points(own, cell), true and points(true, cell), **beside)
     for ax in panels:
         logarithmic_axes(ax)

@@ -12,21 +12,12 @@ from matplotlib.ticker import MaxNLocator
 
 from icha.analysis.model_error import contact_of_spots, jaccard, snapshot_if_any, state_of
 from icha.contact.model import EVENT_KINDS
-from icha.contact.models import REFERENCE_MODEL
 from icha.datasets.campaign import find_snapshot
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of
 from icha.figures.captions import attractions_of, grid_of_loops, range_of_attraction
 from icha.figures.drawn import Name, plot, record, say
-from icha.figures.looks import (
-    BRANCH_DASHES,
-    COARSE_GRID_ALONE,
-    NOT_APPLICABLE_ALONE,
-    REFERENCE_NAME,
-    graded_colours,
-    legend_below,
-    run_label,
-)
+from icha.figures.looks import BRANCH_DASHES, REFERENCE_NAME, graded_colours, legend_below, run_label
 from icha.figures.maps import (
     average_blocks,
     draw_map,
@@ -38,8 +29,8 @@ from icha.figures.maps import (
 )
 from icha.figures.select import (
     NothingToDraw,
-    is_applicable,
-    is_good_loop,
+    doubt_about,
+    doubt_about_loop,
     select_by_labels,
     select_complete_run,
     select_runs,
@@ -133,7 +124,7 @@ def contact_map(
         say(fig, "The map is one period; circles continue across its borders.")
     load = rf"$F/(E^{{\ast}}h′_{{\mathrm{{rms}}}}A_0)$ = {format_number(float(state['reduced_pressure']))}"
     title = f"{run_label(campaign, labels)}, {load}"
-    fig.suptitle(title if is_applicable(data) else f"{title}\n{NOT_APPLICABLE_ALONE}", fontsize="medium")
+    fig.suptitle(f"{title}\n{doubt_about(data)}".rstrip(), fontsize="medium")
     for ax in panels.ravel():
         topography.label(ax)
         if ax is not enlarged:
@@ -234,7 +225,7 @@ def spots_by_slope(
         ax.set_xlabel(f"$x$ ({unit})")
     panels[0].set_ylabel(f"$y$ ({unit})")
     words = {
-        slope: slope_label(slope) + ("" if is_applicable(run) else f" ({NOT_APPLICABLE_ALONE})")
+        slope: slope_label(slope) + (f" ({doubt})" if (doubt := doubt_about(run)) else "")
         for slope, run in by_slope.items()
     }
     legend_below(fig, {words[slope]: Patch(facecolor=colours[slope]) for slope in slopes})
@@ -297,9 +288,8 @@ def snap_map(campaign: xr.DataTree, surface: xr.Dataset, *, run: Sequence) -> Fi
     title = f"{material_label(campaign[labels.study].to_dataset(), labels.material)}, {slope_label(labels.rms_slope)}"
     when.set_title(title, loc="right", fontsize="small")
     handles |= {name: legend_handle(color=GREY, ls=dashes, lw=1.1) for name, dashes in BRANCH_DASHES.items()}
-    if not is_good_loop(data):
-        words = COARSE_GRID_ALONE if labels.model == REFERENCE_MODEL else NOT_APPLICABLE_ALONE
-        handles |= {words: legend_handle(ls="none")}
+    if doubt := doubt_about_loop(data):
+        handles |= {doubt: legend_handle(ls="none")}
     legend_below(fig, handles)
     return fig
 

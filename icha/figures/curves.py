@@ -153,14 +153,14 @@ def study_curves(
     truths = select.select_runs(campaign, other, ragged=False, model=REFERENCE_MODEL) if other else []
     grouped = list(filter(has_points, select.group_by_contact(campaign, truths)))
     materials = dataset["material"].values.tolist()
-    contacts = sorted((group.contact for group in groups), key=lambda contact: materials.index(contact[0]))
-    looks = Looks(campaign, [study], contacts, crosses=bool(grouped) or name != ASPERITIES_NAME)
+    drawn = sorted((group.line for group in groups), key=lambda line: materials.index(line.material))
+    looks = Looks(campaign, [study], drawn, crosses=bool(grouped) or name != ASPERITIES_NAME)
     for group in groups:
-        look = looks.look(group.contact, applicable=group.applicable) | {"ls": "-" if looks.many else "none"} | changed
+        look = looks.look(group.line) | {"ls": "-" if looks.many else "none"} | changed
         if name != ASPERITIES_NAME:
-            look |= {"marker": looks.cross(group.contact, group.model_name)["marker"], "ms": look["ms"] + 2}
+            look |= {"marker": looks.cross(group.line, group.model_name)["marker"], "ms": look["ms"] + 2}
         lines.append(_curve(group, look))
-    crosses = [_curve(truth, looks.cross(truth.contact, truth.model_name)) for truth in grouped]
+    crosses = [_curve(truth, looks.cross(truth.line._replace(doubt=""), truth.model_name)) for truth in grouped]
     changed |= {"ls": "-" if looks.many or any(len(group.by_seed) > 1 for group in groups) else "none"}
     if len(looks.materials if looks.by_place else looks.places) == 1:
         changed |= {} if looks.by_place else {"marker": MODEL_MARKERS[groups[0].model_name]}
@@ -172,7 +172,7 @@ def study_curves(
         handles = looks.colour_handles()
         for curve in (*lines, *crosses):
             model = curve.runs.model_name
-            words = f"{model}, {looks.shape_name(curve.runs.contact)}"
+            words = f"{model}, {looks.shape_name(curve.runs.line)}"
             filled = looks.by_place and curve.look.get("mfc") == curve.look["color"]
             look = {"mfc": GREY if filled else "white", "marker": curve.look["marker"]}
             handles.setdefault(words, model_handle(model, **look))
@@ -208,8 +208,8 @@ def draw_curves(
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Draw the curves of a study on double logarithmic axes; return loads and values of all points of loading."""
     drawn = []
-    asperities = {curve.runs.contact: len(curve.runs.by_seed) for curve in curves.lines}
-    seeds = [(asperities.get(curve.runs.contact, 0), len(curve.runs.by_seed)) for curve in curves.crosses]
+    asperities = {curve.runs.line.contact: len(curve.runs.by_seed) for curve in curves.lines}
+    seeds = [(asperities.get(curve.runs.line.contact, 0), len(curve.runs.by_seed)) for curve in curves.crosses]
     runs = [run for curve in (*curves.lines, *curves.crosses) for run in curve.runs.by_seed.values()]
     say(
         next(iter(panels)),

@@ -12,8 +12,8 @@ from icha.datasets.variables.campaign import NOT_IN_DESIGN
 from icha.figures.captions import range_of_attraction
 from icha.figures.drawn import Name, say
 from icha.figures.ensembles import draw_points
-from icha.figures.looks import Contact, Looks, legend_below
-from icha.figures.select import NothingToDraw
+from icha.figures.looks import Looks, legend_below
+from icha.figures.select import NOT_APPLICABLE, Line, NothingToDraw
 from icha.figures.style import in_style, logarithmic_axes, new_panels
 
 # All materials share a panel if each material has at most this number of lines.
@@ -51,26 +51,24 @@ def distribution_error(campaign: xr.DataTree, model_error: xr.DataTree, *, study
 def _draw_errors(campaign, model_error, study, names, *, percent, words):
     """Draw variables of the model error against load, with a column of panels for each; in per cent if `percent`."""
     curves = _curves(model_error, study, names)
-    contacts = [contact for contact, _ in curves]
-    own_rows = len({tuple(place) for _, *place in contacts}) > _MOST_LINES
-    looks = Looks(campaign, [study], contacts, by_place=own_rows)
+    own_rows = len({line.place for line in curves}) > _MOST_LINES
+    looks = Looks(campaign, [study], curves, by_place=own_rows)
     rows = [[material] for material in looks.materials] if own_rows else [looks.materials]
     fig, panels = new_panels(0.55 + 2.35 * len(rows), len(rows), len(names), sharex=True, sharey="col")
     say(fig, words)
     named: dict[str, object] = {}
     for row, shown in zip(panels, rows, strict=True):
-        drawn = [(*of, errors) for of, errors in curves.items() if of[0][0] in shown]
-        for position, (contact, applicable, errors) in enumerate(drawn):
-            look = looks.look(contact, applicable=applicable)
+        drawn = {line: errors for line, errors in curves.items() if line.material in shown}
+        for position, (line, errors) in enumerate(drawn.items()):
+            look = looks.look(line)
             loads, shift = errors["reduced_pressure"].values, _APART ** (position - (len(drawn) - 1) / 2)
-            material, surface, slope = contact
-            labels = RunLabels(study, None, surface, None, slope, material)
+            labels = RunLabels(study, None, line.surface, None, line.rms_slope, line.material)
             asked = int((errors["status"] != NOT_IN_DESIGN).sum("seed"))
             of_curve = {"name": Name("asperities and boundary elements", labels), "asked": asked}
             for ax, name in zip(row, names, strict=True):
                 members = (100 if percent else 1) * errors[name].values
                 handle = draw_points(ax, loads, members, look, positive=not percent, shift=shift, **of_curve)
-            named.setdefault(looks.name(contact), handle)
+            named.setdefault(looks.name(line), handle)
         for ax in row if own_rows else ():
             ax.set_title(looks.material_name(shown[0]), loc="right", fontsize=8)
     low, high = panels[0, 0].dataLim.intervalx
@@ -88,8 +86,8 @@ def _draw_errors(campaign, model_error, study, names, *, percent, words):
     return fig
 
 
-def _curves(model_error, study, names) -> dict[tuple[Contact, bool], xr.Dataset]:
-    """Return the errors of a study along seeds and loads, by contact and by applicability of the asperity model."""
+def _curves(model_error, study, names) -> dict[Line, xr.Dataset]:
+    """Return the errors of a study along seeds and loads, by line."""
     found = {}
     if study in model_error.children:
         errors = model_error[study].to_dataset().transpose("seed", ...)
@@ -97,11 +95,11 @@ def _curves(model_error, study, names) -> dict[tuple[Contact, bool], xr.Dataset]
         for material, (surface, slope) in itertools.product(errors["material"].values.tolist(), places):
             labels = {"surface": surface, "rms_slope": slope, "material": material}
             of_contact = errors.isel(place_of(errors, labels))
-            for applicable in (True, False):
-                runs = (of_contact["applicability"] == "") == applicable
+            for doubt in ("", NOT_APPLICABLE):
+                runs = (of_contact["applicability"] == "") == (not doubt)
                 shown = of_contact.assign({name: of_contact[name].where(runs) for name in names})
                 if any(np.isfinite(shown[name].values).any() for name in names):
-                    found[(material, surface, slope), applicable] = shown
+                    found[Line(material, surface, slope, doubt=doubt)] = shown
     if not found:
         raise NothingToDraw(f"study {study}: no run that was compared with boundary elements is complete")
     return found

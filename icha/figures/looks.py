@@ -20,12 +20,9 @@ from icha.contact.models import DEFAULT_MODEL, MODELS, REFERENCE_MODEL
 from icha.datasets.labels import RunLabels, slopes_of
 from icha.datasets.quantities import symbol_of
 from icha.figures.drawn import scatter_handles
-from icha.figures.select import FINITE_RANGE_NAME
+from icha.figures.select import FINITE_RANGE_NAME, Line
 from icha.figures.style import BLACK, COLOURS, GREY, INTERFACE, legend_handle, material_label, slope_label
 from icha.support.formatting import format_quantity
-
-# A contact: material, surface and rms slope of a line. The slope is None if slopes are not distinguished.
-Contact = tuple[str, str, float | None]
 
 # The colours of Okabe and Ito except black, and darker colours of the same hues. Black lines are theories.
 MATERIAL_COLOURS = (*COLOURS[:-1], "#004166", "#803800", "#005A42", "#80436A", "#805800", "#2B6C94")
@@ -53,50 +50,50 @@ _LINE_WIDTH = 0.22
 _MOST_NAMED = 9
 # Fraction of the original colour in a pale colour; the rest is white.
 _PALENESS = 0.4
-
-# Labels of runs for which the asperity model is not applicable: in figures of several runs, and in figures of one run.
-NOT_APPLICABLE = "pale: asperity model not applicable"
-NOT_APPLICABLE_ALONE = "asperity model not applicable"
-# The same for boundary elements.
-COARSE_GRID = "pale: grid too coarse for boundary elements"
-COARSE_GRID_ALONE = "grid too coarse for boundary elements"
+# Beginning of the legend entry of pale lines.
+_PALE = "pale: "
 
 
 class Looks:
-    """Colour, marker and name of every line of a figure.
-
-    A `contact` is a material, a surface and an rms slope; a `place` is a surface and an rms slope.
+    """Colour, marker and name of every line of a figure; a `place` is a surface and an rms slope.
 
     Parameters
     ----------
     campaign : the campaign dataset; the order of the materials in the dataset determines the colours.
     studies : names of the studies with the materials.
-    contacts : material, surface and rms slope of every line.
+    lines : the lines of the figure.
     by_place : True if colours distinguish places instead of materials; None if they do so for a single material. Always
         True for more than `MOST_COLOURS` places.
-    crosses : True if boundary elements are drawn as crosses. Colours then distinguish places if there are more places
-        than shapes of crosses.
+    crosses : True if boundary elements are drawn as crosses; None if they are so beside lines of another model. Colours
+        then distinguish places if there are more places than shapes of crosses.
     only_drawn : True if names of materials need not differ from those of materials without a line.
+
+    Attributes
+    ----------
+    models : names of the models of the lines.
     """
 
     def __init__(
         self,
         campaign: xr.DataTree,
         studies: Sequence[str],
-        contacts: Iterable[Contact],
+        lines: Iterable[Line],
         *,
         by_place: bool | None = False,
-        crosses: bool = False,
+        crosses: bool | None = None,
         only_drawn: bool = False,
     ):
         """Assign colours and markers to the lines."""
-        self._campaign = campaign
-        self.contacts = list(dict.fromkeys(contacts))
+        self._campaign, lines = campaign, list(lines)
+        contacts = dict.fromkeys(line.contact for line in lines)
+        self.models = list(dict.fromkeys(MODELS[line.model].words for line in lines))
+        crosses = len(self.models) > 1 if crosses is None else crosses
+        self._few = len(contacts) <= FEW_LINES
         interfaces = xr.concat([campaign[study].to_dataset()[INTERFACE] for study in studies], "material")
-        self.materials = list(dict.fromkeys(material for material, *_ in self.contacts))
+        self.materials = list(dict.fromkeys(material for material, *_ in contacts))
         interfaces = interfaces.drop_duplicates("material")
         self._interfaces = interfaces.sel(material=self.materials) if only_drawn else interfaces
-        self.places = list(dict.fromkeys(tuple(place) for _, *place in self.contacts))
+        self.places = list(dict.fromkeys(tuple(place) for _, *place in contacts))
         self.by_place = len(self.places) > (len(CROSSES) if crosses else MOST_COLOURS)
         self.by_place |= (len(self.materials) == 1 if by_place is None else by_place) and len(self.places) > 1
         coloured = self.places if self.by_place else self.materials
@@ -123,19 +120,21 @@ class Looks:
         """Return True if the surface energy of a material is positive."""
         return float(self._interfaces["surface_energy"].sel(material=material)) > 0
 
-    def colour(self, contact: Contact) -> str:
-        """Return the colour of a contact; grey if the figure has no line of this material or surface."""
-        material, *place = contact
-        return self._colours.get(tuple(place) if self.by_place else material, GREY)
+    def is_beside(self, line: Line) -> bool:
+        """Return True if a line shows boundary elements beside another model."""
+        return len(self.models) > 1 and line.model == REFERENCE_MODEL
+
+    def colour(self, line: Line) -> str:
+        """Return the colour of a line; grey if the figure has no line of this material or surface."""
+        return self._colours.get(line.place if self.by_place else line.material, GREY)
 
     def material_colour(self, material: str | None) -> str:
         """Return the colour of a material; black if the colours do not show this material."""
         return self._colours.get(material, BLACK)
 
-    def look(self, contact: Contact, *, applicable: bool = True, model: str = DEFAULT_MODEL) -> dict:
-        """Return arguments of `Axes.plot` for a line; colours are pale if the `model` is not `applicable`."""
-        material, *place = contact
-        colour, size, adhesive = self.colour(contact), self._sizes[material], self.adhesive(material)
+    def look(self, line: Line) -> dict:
+        """Return arguments of `Axes.plot` for a line."""
+        colour, size, adhesive = self.colour(line), self._sizes[line.material], self.adhesive(line.material)
         look = {
             "color": colour,
             "mec": colour,
@@ -143,28 +142,26 @@ class Looks:
             "mew": 0.9,
             "ms": size,
             "lw": _LINE_WIDTH * size,
-            "zorder": 3 + adhesive + 0.01 * self.materials.index(material),
-            "marker": self._markers[material if self.by_place else tuple(place)],
+            "zorder": 3 + adhesive + 0.01 * self.materials.index(line.material),
+            "marker": self._markers[line.material if self.by_place else line.place],
         }
-        if len(self.contacts) > FEW_LINES:
+        if not self._few:
             look |= {"lw": 0.6, "ms": (0.6 if self.many else 0.8) * size}
-        return look if applicable else pale(look, model)
+        return pale(look, line.doubt)
 
-    def cross(
-        self, contact: Contact, model_name: str = REFERENCE_NAME, *, applicable: bool = True, shape: str | None = None
-    ) -> dict:
+    def cross(self, line: Line, model_name: str = REFERENCE_NAME, *, shape: str | None = None) -> dict:
         """Return arguments of `Axes.plot` for boundary elements: crosses in the colour of the material or place.
 
         `shape` is the marker of the first surface and slope, if it is not the usual one.
         """
-        colour, adhesive = self.colour(contact), self.adhesive(contact[0])
+        colour, adhesive = self.colour(line), self.adhesive(line.material)
         # Crosses without adhesion are larger than crosses with adhesion, so that both are visible if they coincide.
-        size = (8 if adhesive else 11) * (1 if len(self.contacts) <= FEW_LINES else 0.7)
-        rank = self.rank(contact) if model_name == REFERENCE_NAME else 0
+        size = (8 if adhesive else 11) * (1 if self._few else 0.7)
+        rank = self.rank(line) if model_name == REFERENCE_NAME else 0
         marker = CROSSES[rank % len(CROSSES)] if rank else shape or MODEL_MARKERS[model_name]
-        look = {"color": colour, "mec": colour, "ms": size, "zorder": 6 + adhesive, "ls": "none", "marker": marker}
-        look |= {"mew": 1.0}
-        return look if applicable else pale(look, REFERENCE_MODEL)
+        look = {"color": colour, "mec": colour, "mew": 1.0, "ms": size, "ls": "none", "marker": marker}
+        look["zorder"] = 6 + adhesive
+        return pale(look, line.doubt)
 
     def handles(self, **changed: object) -> dict[str, Line2D]:
         """Return the legend entries of materials, surfaces and slopes by name.
@@ -173,13 +170,14 @@ class Looks:
         """
         material, place = self.materials[0], self.places[0]
         if self.by_place:
-            found = {self.place_name(each): self.look((material, *each)) | changed for each in some_of(self.places)}
+            found = {self.place_name(each): self.look(Line(material, *each)) | changed for each in some_of(self.places)}
             for each in [] if self.heading() else some_of(self.materials):
-                look = self.look((each, *place)) | changed | {"color": GREY, "mec": GREY}
+                look = self.look(Line(each, *place)) | changed | {"color": GREY, "mec": GREY}
                 found[self.material_name(each)] = look | ({"mfc": GREY} if self.adhesive(each) else {})
         else:
             changed = ({"marker": MODEL_MARKERS[ASPERITIES_NAME]} if self.place_name(place) else {}) | changed
-            found = {self.material_name(each): self.look((each, *place)) | changed for each in some_of(self.materials)}
+            looks = {each: self.look(Line(each, *place)) | changed for each in some_of(self.materials)}
+            found = {self.material_name(each): look for each, look in looks.items()}
             grey = {"ls": "none", "color": GREY, "mfc": "white", "mew": 0.9, "ms": 5}
             found |= {self.place_name(each): grey | {"marker": marker} for each, marker in self._markers.items()}
             found.pop("", None)  # the name is empty if the figure has a single surface and slope
@@ -200,10 +198,9 @@ class Looks:
         named, coloured = (self.place_name, self.places) if self.by_place else (self.material_name, self.materials)
         return {named(each): legend_handle(color=self._colours[each], lw=4) for each in some_of(coloured)}
 
-    def shape_name(self, contact: Contact) -> str:
-        """Return what the marker of a contact shows, as text: surface and slope, or the material."""
-        material, *place = contact
-        return self.material_name(material) if self.by_place else self.place_name(tuple(place))
+    def shape_name(self, line: Line) -> str:
+        """Return what the marker of a line shows, as text: surface and slope, or the material."""
+        return self.material_name(line.material) if self.by_place else self.place_name(line.place)
 
     def material_name(self, material: str) -> str:
         """Return a text with the modulus and the surface energy of a material."""
@@ -216,19 +213,18 @@ class Looks:
         words = [surface_label(self._campaign, surface)] if len(surfaces) > 1 else []
         return ", ".join([*words, slope_label(slope)] if slope is not None and len(slopes) > 1 else words)
 
-    def rank(self, contact: Contact) -> int:
-        """Return the number of a contact in the order of the markers, from 0; 0 for unknown ones."""
-        shapes, shape = list(self._markers), contact[0] if self.by_place else contact[1:]
+    def rank(self, line: Line) -> int:
+        """Return the number of a line in the order of the markers, from 0; 0 for unknown ones."""
+        shapes, shape = list(self._markers), line.material if self.by_place else line.place
         return shapes.index(shape) if shape in shapes else 0
 
-    def name(self, contact: Contact) -> str:
+    def name(self, line: Line) -> str:
         """Return a name that distinguishes a line from the other lines of the figure."""
-        material, *place = contact
-        place = self.place_name(tuple(place))
+        place = self.place_name(line.place)
         # If colours distinguish surfaces and slopes, the name of the only material is left out.
         if place and self.by_place and len(self.materials) == 1:
             return place
-        return ", ".join(filter(None, [self.material_name(material), place]))
+        return ", ".join(filter(None, [self.material_name(line.material), place]))
 
 
 def surface_label(campaign: xr.DataTree, surface: str) -> str:
@@ -270,12 +266,13 @@ def material_colours(campaign: xr.DataTree) -> dict[str, str]:
     return dict(zip(dict.fromkeys(materials), itertools.cycle(MATERIAL_COLOURS)))
 
 
-def pale(look: dict, model: str) -> dict:
-    """Return a look in a lighter colour, for runs to which a model is not applicable; open markers stay open."""
+def pale(look: dict, doubt: str) -> dict:
+    """Return a look in a lighter colour for runs with a `doubt`, the same look without one; open markers stay open."""
+    if not doubt:
+        return look
     colour = to_hex([1 - _PALENESS * (1 - part) for part in to_rgb(look["color"])])
-    label = COARSE_GRID if model == REFERENCE_MODEL else NOT_APPLICABLE
     filling = {"mfc": colour} if look.get("mfc") == look["color"] else {}
-    return look | {"color": colour, "mec": colour, "label": label} | filling
+    return look | {"color": colour, "mec": colour, "label": f"{_PALE}{doubt}"} | filling
 
 
 def graded_colours(count: int) -> list[str]:
@@ -312,7 +309,7 @@ def legend_below(figure: Figure, handles: Mapping[str, object], heading: str | N
     for axes in figure.axes:
         for handle, name in zip(*axes.get_legend_handles_labels(), strict=True):
             named.setdefault(name, handle)
-    last = {name: named.pop(name) for name in (FEWER_SEEDS, NOT_APPLICABLE, COARSE_GRID) if name in named}
+    last = {name: named.pop(name) for name in sorted(named) if name.startswith((FEWER_SEEDS, _PALE))}
     handles = dict(handles) | scatter_handles(figure) | named | last
     look = {"loc": "outside lower center", "fontsize": 8 if len(handles) <= _MANY_NAMES else 7}
     for columns in range(_MOST_COLUMNS if handles else 0, 0, -1):

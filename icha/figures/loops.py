@@ -59,10 +59,19 @@ def loops(
     slopes = sorted({labels.rms_slope for labels, _ in runs}, reverse=True)
     own_rows = len(runs) > _MOST_LOOPS and 1 < len(slopes) < len(runs)
     # Slopes that have their own panels need no markers.
-    contacts = [(labels.material, labels.surface, None if own_rows else labels.rms_slope) for labels, _ in runs]
-    looks, drawn = Looks(campaign, [study], contacts, by_place=None), []
-    for (labels, run), contact in zip(runs, contacts, strict=True):
-        look = looks.look(contact, applicable=select.is_good_loop(run), model=labels.model)
+    lines = [
+        select.Line(
+            labels.material,
+            labels.surface,
+            None if own_rows else labels.rms_slope,
+            labels.model,
+            select.doubt_about_loop(run),
+        )
+        for labels, run in runs
+    ]
+    looks, drawn = Looks(campaign, [study], lines, by_place=None), []
+    for (labels, run), line in zip(runs, lines, strict=True):
+        look = looks.look(line)
         drawn.append((labels, run, [each for each in truths if not difference_of_contacts(run, each)], look))
 
     # A smooth shape has no roughness, whose height and slope are the reduced units.
@@ -131,8 +140,8 @@ def _draw(ax, labels, run, truths, look, panel, *, turn):
         for branch, markers in _TRUTH_MARKERS.items():
             states = truth.isel(step=truth["branch"].values == branch)
             crosses = {"color": colour, "marker": markers[name], **_TRUTH}
-            # The colour is already pale if the asperity model is not applicable.
-            crosses = crosses if select.is_good_loop(truth) or "label" in look else pale(crosses, REFERENCE_MODEL)
+            # The colour may be pale already, like that of the run.
+            crosses = crosses if "label" in look else pale(crosses, select.doubt_about_loop(truth))
             of_truth = Name(f"{name}, {branch}", labels._replace(model=REFERENCE_MODEL))
             plot(ax, *panel.points(states), of_truth, markevery=_APART, **crosses)
 

@@ -8,7 +8,7 @@ import xarray as xr
 
 from icha.analysis.model_error import snapshot_if_any
 from icha.contact.attraction import FINITE_RANGE
-from icha.contact.models import MODELS, REFERENCE_MODEL, first_model, model_of
+from icha.contact.models import DEFAULT_MODEL, MODELS, REFERENCE_MODEL, first_model, model_of
 from icha.datasets.campaign import find_snapshot, loading_stops, reduced_gap, run_place, runs_of_status, select_run
 from icha.datasets.labels import LABELS, RunLabels, place_of
 from icha.datasets.quantities import quantity
@@ -21,6 +21,9 @@ from icha.uncertainty.grid_error import LOOP_ERRORS, cells_of_length
 
 # Name of boundary elements at a finite range of attraction in legends; other names are in the records of the models.
 FINITE_RANGE_NAME = "boundary elements at finite range"
+# Why lines are pale, in the words of a legend.
+NOT_APPLICABLE = "asperity model not applicable"
+COARSE_GRID = "grid too coarse for boundary elements"
 
 
 def name_of_model(run: xr.Dataset) -> str:
@@ -32,28 +35,57 @@ class NothingToDraw(ValueError):
     """The campaign has no complete run that the figure could show; the message names what is missing."""
 
 
+class Line(NamedTuple):
+    """What a line of a figure shows.
+
+    Attributes
+    ----------
+    material, surface : names of material and surface.
+    rms_slope : rms slope of the surface; None if the figure does not distinguish slopes.
+    model : contact model.
+    doubt : why the line is drawn pale, as `doubt_about` states it; "" for most lines.
+    """
+
+    material: str
+    surface: str
+    rms_slope: float | None
+    model: str = DEFAULT_MODEL
+    doubt: str = ""
+
+    @property
+    def contact(self) -> tuple[str, str, float | None]:
+        """Material, surface and rms slope."""
+        return self[:3]
+
+    @property
+    def place(self) -> tuple[str, float | None]:
+        """Surface and rms slope."""
+        return self[1:3]
+
+
 class ContactRuns(NamedTuple):
     """The complete runs of one model, material, surface and rms slope: one run for each seed.
 
-    Runs to which the model is not applicable form a separate group, and loops that the grid does not resolve.
+    Runs that are drawn pale form a separate group.
 
     Attributes
     ----------
     labels : labels of the first run.
     by_seed : the runs, by seed.
     asked : number of seeds that the study requests.
-    applicable : False if the runs are drawn pale.
+    doubt : why the runs are drawn pale, as `doubt_about` states it; "" for most runs.
     """
 
     labels: RunLabels
     by_seed: dict[int, xr.Dataset]
     asked: int
-    applicable: bool
+    doubt: str = ""
 
     @property
-    def contact(self) -> tuple[str, str, float]:
-        """Material, surface and rms slope."""
-        return self.labels.material, self.labels.surface, self.labels.rms_slope
+    def line(self) -> Line:
+        """The line that shows the runs."""
+        labels = self.labels
+        return Line(labels.material, labels.surface, labels.rms_slope, labels.model, self.doubt)
 
     @property
     def model_name(self) -> str:
@@ -85,12 +117,12 @@ class ContactRuns(NamedTuple):
 def group_by_contact(
     campaign: xr.DataTree,
     runs: Iterable[tuple[RunLabels, xr.Dataset]],
-    applicable: Callable[[xr.Dataset], bool] | None = None,
+    doubt_of_run: Callable[[xr.Dataset], str] | None = None,
 ) -> list[ContactRuns]:
-    """Group runs that differ only in their seed; `applicable` is a function of a run, `is_applicable` by default."""
+    """Group runs that differ only in their seed; `doubt_of_run` states why a run is drawn pale (`doubt_about`)."""
     found: dict[tuple, ContactRuns] = {}
     for labels, run in runs:
-        key = labels._replace(seed=None), (applicable or is_applicable)(run)
+        key = labels._replace(seed=None), (doubt_of_run or doubt_about)(run)
         if key not in found:
             asked = asked_seeds(campaign[labels.study].to_dataset(), labels)
             found[key] = ContactRuns(labels, {}, asked, key[1])
@@ -138,16 +170,19 @@ def has_layer(study: xr.Dataset) -> bool:
     return free or (compression is not None and bool((np.abs(compression) > 0).any()))
 
 
-def is_applicable(run: xr.Dataset) -> bool:
-    """Return False if a run states a reason why the asperity model is not applicable, otherwise True."""
-    return not run.attrs.get("applicability")
+def doubt_about(run: xr.Dataset) -> str:
+    """Return that the model of a run is not applicable, in the words of a legend; "" if the run states no reason."""
+    if not run.attrs.get("applicability"):
+        return ""
+    model = run.attrs.get("contact_model", DEFAULT_MODEL)
+    return NOT_APPLICABLE if model == DEFAULT_MODEL else f"{MODELS[model].words} not applicable"
 
 
-def is_good_loop(run: xr.Dataset, variable: str = "hysteresis_loss") -> bool:
-    """Return False if a model is not applicable to a run that unloads, or its grid too coarse for pull-off or loss."""
+def doubt_about_loop(run: xr.Dataset, variable: str = "hysteresis_loss") -> str:
+    """Return why pull-off or loss of a run is in doubt: its grid is too coarse, or `doubt_about`."""
     least = LOOP_ERRORS[variable].least_cells
     coarse = run.attrs.get("contact_model") == REFERENCE_MODEL and cells_of_length(run) < least
-    return is_applicable(run) and not coarse
+    return COARSE_GRID if coarse else doubt_about(run)
 
 
 def shown_model(study: xr.Dataset) -> str:
@@ -241,11 +276,12 @@ def select_snapshots(
     reference = [] if alone else group_by_contact(campaign, select_runs(campaign, study, model=REFERENCE_MODEL))
     found = []
     for group in groups:
-        if group.contact[1:] == groups[0].contact[1:]:
+        if group.line.place == groups[0].line.place:
             members = [(run, find_snapshot(run, kind, target)) for run in group.by_seed.values()]
             run, at = members[0]
             state = str(run["snapshot_kind"].values[at]), float(run["snapshot_target"].values[at])
-            beside = [run for each in reference if each.contact == group.contact for run in each.by_seed.values()]
+            alike = [each for each in reference if each.line.contact == group.line.contact]
+            beside = [run for each in alike for run in each.by_seed.values()]
             truths = [(truth, snapshot_if_any(truth, *state)) for truth in beside]
             found.append(Snapshots(group, members, [truth for truth in truths if truth[1] is not None]))
     return found
@@ -295,23 +331,16 @@ def _select_runs_with(condition, campaign, study, models=(None, REFERENCE_MODEL)
 
 
 def select_detached_lines(
-    campaign: xr.DataTree,
-    studies: Sequence[str],
-    *,
-    quantity: str = "pull_off_pressure",
-    along_slopes: bool = False,
-    both_models: bool = False,
-) -> dict[tuple[tuple[str, str, float | None], bool, str], list[ContactRuns]]:
-    """Return the runs of some studies that were unloaded to complete separation, arranged as lines of points.
+    campaign: xr.DataTree, studies: Sequence[str], quantity: str, *, along_slopes: bool = False
+) -> dict[Line, list[ContactRuns]]:
+    """Return the runs of some studies that were unloaded to complete separation, as lines of points.
 
-    A key of the result has three parts: a tuple of material, surface and slope; the result of `is_good_loop`; and the
-    name of the model. Raise `NothingToDraw` if there is no line.
+    Boundary elements are beside runs of another model. Raise `NothingToDraw` if there is no line.
 
     Parameters
     ----------
     quantity : variable of the loop that the runs must have; a run that failed checks of its loss has no loss.
     along_slopes : True if a line joins points at several rms slopes. If False, every rms slope has its own line.
-    both_models : True to add boundary elements to runs of another model.
     """
 
     def has_quantity(run):
@@ -320,11 +349,10 @@ def select_detached_lines(
     found = {}
     for study in studies:
         runs = _select_runs_with(has_quantity, campaign, study)
-        if both_models and runs and runs[0][0].model != REFERENCE_MODEL:
+        if runs and runs[0][0].model != REFERENCE_MODEL:
             runs += _select_runs_with(has_quantity, campaign, study, [REFERENCE_MODEL])
-        for point in group_by_contact(campaign, runs, lambda run: is_good_loop(run, quantity)):
-            material, surface, slope = point.contact
-            line = (material, surface, None if along_slopes else slope), point.applicable, point.labels.model
+        for point in group_by_contact(campaign, runs, lambda run: doubt_about_loop(run, quantity)):
+            line = point.line._replace(rms_slope=None) if along_slopes else point.line
             found.setdefault(line, []).append(point)
     if studies and not found:
         words = quantity.replace("_", " ")

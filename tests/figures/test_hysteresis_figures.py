@@ -261,7 +261,7 @@ def test_fig15_fits_nothing_through_two_loads_or_other_seeds(tree):
 def points(*runs):
     """A line of points, from x and y of every seed."""
     return Points(
-        [ContactRuns(None, {seed: {"x": x, "y": y} for seed, (x, y) in own.items()}, len(own), True) for own in runs],
+        [ContactRuns(None, {seed: {"x": x, "y": y} for seed, (x, y) in own.items()}, len(own)) for own in runs],
         "x",
         "y",
     )
@@ -279,7 +279,7 @@ def test_fig15_parts_are_of_either_sign_and_make_up_the_whole(tree):
     run = loop()
     parts = {"loss_by_jump_in": 3.0, "loss_by_jump_off": 1.0, "loss_by_coalescence": -1.0, "loss_unattributed": 0.0}
     line = [{1: run.assign(parts), 2: run.assign(parts)}, {1: run.assign(largest_reduced_pressure=-1.0)}]
-    found = shares([ContactRuns(None, runs, 2, True) for runs in line])
+    found = shares([ContactRuns(None, runs, 2) for runs in line])
     assert list(found.values()) == pytest.approx([0.6, 0.2, -0.2, 0, 0, 0])
     figure = against_parameter.loss(one(**parts), studies=["one"])
     heights = sorted((bar.get_y(), bar.get_y() + bar.get_height()) for bar in figure.axes[1].patches)

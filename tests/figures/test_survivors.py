@@ -12,7 +12,8 @@ from icha.figures import against_load, against_parameter, contact_maps, loops
 from icha.figures.captions import count_runs
 from icha.figures.drawn import Name
 from icha.figures.ensembles import draw_members, draw_points
-from icha.figures.looks import FEWER_SEEDS, NOT_APPLICABLE, NOT_APPLICABLE_ALONE
+from icha.figures.looks import FEWER_SEEDS
+from icha.figures.select import NOT_APPLICABLE
 from icha.figures.style import new_figure
 
 SEEDS = range(1, 6)
@@ -56,9 +57,9 @@ def test_means_over_fewer_seeds_are_crossed_and_runs_not_applicable_are_pale(mod
     for cross in crossed(axes):
         marked = [line for line in lines_of(axes) if line.get_marker() != "x"]
         assert any(np.isin(cross.get_xdata(), line.get_xdata()).all() for line in marked)
-    assert legend(figure).count(FEWER_SEEDS) == legend(figure).count(NOT_APPLICABLE) == 1
+    assert legend(figure).count(FEWER_SEEDS) == legend(figure).count(f"pale: {NOT_APPLICABLE}") == 1
     if module is against_parameter.loss:
-        assert NOT_APPLICABLE in legend(draw(loops.loops, campaign(pale=(1,), run=run)))
+        assert f"pale: {NOT_APPLICABLE}" in legend(draw(loops.loops, campaign(pale=(1,), run=run)))
 
 
 def test_runs_that_failed_at_different_steps_are_in_no_mean():
@@ -93,8 +94,8 @@ def test_no_line_joins_means_over_different_seeds(few):
 def test_figures_of_one_run_say_that_the_model_is_not_applicable(surface):
     tree = campaign(pale=(1,))
     figure = contact_maps.contact_map(tree, surface, run=("five", "asperities", "rough", 1, 1.0, "soft"))
-    assert NOT_APPLICABLE_ALONE in figure.get_suptitle()
-    assert NOT_APPLICABLE_ALONE in legend(contact_maps.spots_by_slope(tree, study="five"))[0]
+    assert NOT_APPLICABLE in figure.get_suptitle()
+    assert NOT_APPLICABLE in legend(contact_maps.spots_by_slope(tree, study="five"))[0]
 
 
 def test_captions_count_what_is_missing():

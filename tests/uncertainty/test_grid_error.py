@@ -14,7 +14,7 @@ from icha.datasets.labels import RunLabels
 from icha.figures import against_parameter
 from icha.figures import loops as loop_figures
 from icha.figures.drawn import caption_of
-from icha.figures.looks import COARSE_GRID
+from icha.figures.select import COARSE_GRID
 from icha.report.answers import answers_of, answers_table
 from icha.report.validity import statements_on_dataset
 from icha.uncertainty.estimates import estimate_campaign
@@ -74,8 +74,8 @@ def test_loops_on_a_coarse_grid_are_named_and_pale():
     for module in (loop_figures.loops, against_parameter.pull_off, against_parameter.loss):
         options = {"studies": ["pull"]} if module is against_parameter.loss else {"study": "pull"}
         figure = module(coarse, **options)
-        assert COARSE_GRID in legend(figure) and "0.7 cells for soft on rough" in caption_of(figure)
-        assert COARSE_GRID not in legend(module(fine, **options))
+        assert f"pale: {COARSE_GRID}" in legend(figure) and "0.7 cells for soft on rough" in caption_of(figure)
+        assert f"pale: {COARSE_GRID}" not in legend(module(fine, **options))
     assert {each.about: each.good for each in statements_on_dataset(fine)}["loops"]
 
 
