@@ -203,11 +203,9 @@ def spots_by_slope(
 ) -> Figure:
     """Draw the spots of all slopes for one surface, seed and material; the defaults are those of the first run."""
     runs = select_by_labels(select_runs(campaign, study), surface=surface, seed=seed, material=material)
-    by_slope = {labels.rms_slope: run for labels, run in runs}
-    names = {labels.rms_slope: Name("spots", labels) for labels, _ in runs}
-    slopes = sorted(by_slope, reverse=True)
+    runs = sorted(runs, key=lambda each: -each[0].rms_slope)
     # Slopes have colours from dark to bright, because the other colours stand for materials.
-    colours = dict(zip(slopes, graded_colours(len(slopes)), strict=True))
+    colours = graded_colours(len(runs))
 
     fig, [panels] = new_panels(3.8, sharey=True)
     say(
@@ -218,39 +216,38 @@ def spots_by_slope(
         on top of them. At a given contact area, the spots of all slopes nearly coincide, so every slope fills one
         sector of each circle in panel (b).""",
     )
-    length, unit = choose_unit(float(by_slope[slopes[0]]["period"]), "m")
+    length, unit = choose_unit(float(runs[0][1]["period"]), "m")
     for ax, kind in zip(panels, _SNAPSHOTS, strict=True):
-        _draw_slopes(ax, by_slope, names, kind, colours, length)
-        ax.set_aspect("equal")
-        ax.set_xlabel(f"$x$ ({unit})")
+        _draw_slopes(ax, runs, kind, colours, length)
+        ax.set(aspect="equal", xlabel=f"$x$ ({unit})")
     panels[0].set_ylabel(f"$y$ ({unit})")
-    words = {
-        slope: slope_label(slope) + (f" ({doubt})" if (doubt := doubt_about(run)) else "")
-        for slope, run in by_slope.items()
-    }
-    legend_below(fig, {words[slope]: Patch(facecolor=colours[slope]) for slope in slopes})
+    handles = {}
+    for (labels, run), colour in zip(runs, colours, strict=True):
+        name = slope_label(labels.rms_slope) + (f" ({doubt})" if (doubt := doubt_about(run)) else "")
+        handles[name] = Patch(facecolor=colour)
+    legend_below(fig, handles)
     return fig
 
 
-def _draw_slopes(ax, runs, names, kind, colours, length):
-    """Draw the spots of each slope at the first snapshot of a kind; `runs` and `names` are by slope."""
-    at = {slope: find_snapshot(run, kind) for slope, run in runs.items()}
-    areas = {slope: float(state_of(run, at[slope])["contact_area_fraction"]) for slope, run in runs.items()}
+def _draw_slopes(ax, runs, kind, colours, length):
+    """Draw the spots of each slope at the first snapshot of a kind."""
+    at = [find_snapshot(run, kind) for _, run in runs]
+    areas = [float(state_of(run, k)["contact_area_fraction"]) for (_, run), k in zip(runs, at, strict=True)]
     # Slopes with less contact area are drawn on top of slopes with more contact area.
-    for order, slope in enumerate(sorted(colours, key=areas.get, reverse=True)):
-        run, look = runs[slope], {"facecolor": colours[slope], "edgecolor": "black", "lw": 0.25}
-        side, circles = float(run["period"]) * length, spot_circles(run, at[slope], length)
-        record_spots(ax, circles, side, names[slope])
+    for order, k in enumerate(np.argsort(np.negative(areas), kind="stable")):
+        (labels, run), look = runs[k], {"facecolor": colours[k], "edgecolor": "black", "lw": 0.25}
+        side, circles = float(run["period"]) * length, spot_circles(run, at[k], length)
+        record_spots(ax, circles, side, Name("spots", labels))
         if kind == "relative_load":
             draw_spots(ax, circles, zorder=2 + order, **look)
         else:
             # The spots of all slopes nearly coincide. Each slope fills a sector of the circle, so that all slopes show.
             share = 360 / len(runs)
-            start = 90 + share * list(colours).index(slope)
+            start = 90 + share * k
             ax.add_collection(PatchCollection([Wedge((x, y), r, start, start + share) for x, y, r in circles], **look))
     ax.set(xlim=(0, side), ylim=(0, side))
     sectors = "" if kind == "relative_load" or len(runs) == 1 else ", a sector for each slope"
-    ax.set_title(snapshot_label(run, at[slope]) + sectors, loc="right")
+    ax.set_title(snapshot_label(run, at[k]) + sectors, loc="right")
 
 
 # --- figure 16 ---

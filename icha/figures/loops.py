@@ -58,21 +58,14 @@ def loops(
     truths = [run for labels, run in others if labels not in shown and select.unloading_legs(run)]
     slopes = sorted({labels.rms_slope for labels, _ in runs}, reverse=True)
     own_rows = len(runs) > _MOST_LOOPS and 1 < len(slopes) < len(runs)
-    # Slopes that have their own panels need no markers.
-    lines = [
-        select.Line(
-            labels.material,
-            labels.surface,
-            None if own_rows else labels.rms_slope,
-            labels.model,
-            select.doubt_about_loop(run),
-        )
-        for labels, run in runs
+    drawn = [(labels, run, select.Line.of(labels, select.doubt_about_loop(run))) for labels, run in runs]
+    if own_rows:  # Slopes that have their own panels need no markers.
+        drawn = [(*loop, line._replace(rms_slope=None)) for *loop, line in drawn]
+    looks = Looks(campaign, [study], [line for *_, line in drawn], by_place=None)
+    drawn = [
+        (labels, run, [each for each in truths if not difference_of_contacts(run, each)], looks.look(line))
+        for labels, run, line in drawn
     ]
-    looks, drawn = Looks(campaign, [study], lines, by_place=None), []
-    for (labels, run), line in zip(runs, lines, strict=True):
-        look = looks.look(line)
-        drawn.append((labels, run, [each for each in truths if not difference_of_contacts(run, each)], look))
 
     # A smooth shape has no roughness, whose height and slope are the reduced units.
     physical = units == "physical" or not any(float(run["rms_height"]) for _, run in runs)

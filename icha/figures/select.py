@@ -1,7 +1,7 @@
 """Select runs, snapshots and errors for a figure from the datasets of a campaign."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 import xarray as xr
@@ -52,6 +52,11 @@ class Line(NamedTuple):
     model: str = DEFAULT_MODEL
     doubt: str = ""
 
+    @classmethod
+    def of(cls, labels: RunLabels, doubt: str = "") -> Self:
+        """Return the line of runs with these labels, except the seed."""
+        return cls(labels.material, labels.surface, labels.rms_slope, labels.model, doubt)
+
     @property
     def contact(self) -> tuple[str, str, float | None]:
         """Material, surface and rms slope."""
@@ -84,8 +89,7 @@ class ContactRuns(NamedTuple):
     @property
     def line(self) -> Line:
         """The line that shows the runs."""
-        labels = self.labels
-        return Line(labels.material, labels.surface, labels.rms_slope, labels.model, self.doubt)
+        return Line.of(self.labels, self.doubt)
 
     @property
     def model_name(self) -> str:
