@@ -47,15 +47,14 @@ def describe(
 
 def _print_scans(campaign, plots: Path | None) -> None:
     """Print the descriptions of the measured surfaces that studies use; draw them to the folder `plots`, if given."""
-    from icha.configuration.cases import run_cases
     from icha.configuration.surfaces import MeasuredSurface, SpectrumSurface
     from icha.contact.models import MODELS
 
     models: dict[str, list] = {}
-    for case in run_cases(campaign):
+    for case in campaign.all_runs:
         if isinstance(campaign.surfaces[case.surface], MeasuredSurface):
             models.setdefault(case.surface, []).append(MODELS[case.model])
-    for name in dict.fromkeys(case.surface for case in run_cases(campaign)):
+    for name in campaign.used_surfaces:
         if isinstance(section := campaign.surfaces[name], SpectrumSurface):
             for line in _spectrum_lines(section):
                 echo(f"{name}: {line}")

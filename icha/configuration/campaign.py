@@ -16,7 +16,7 @@ from pydantic import AfterValidator, Field, PrivateAttr
 from icha.configuration.figures import Figures
 from icha.configuration.measurements import Measurement
 from icha.configuration.publication import Line, Prose, Publication
-from icha.configuration.studies import RmsHeight, Study, is_unread, slope_of_height
+from icha.configuration.studies import MEASURED, RmsHeight, Study, is_unread, slope_of_height
 from icha.configuration.surfaces import AnySurface, MaterialSection
 from icha.contact.models import MODELS
 from icha.datasets.labels import LABELS, RunLabels, is_derived_study
@@ -58,10 +58,6 @@ class Topography(NamedTuple):
     rms_curvature: float
     shortest_wave: tuple[float, bool]
     repeated_height: str
-
-    def slope_of(self, slope: str | RmsHeight) -> float:
-        """Return the rms slope for the word `measured`, or the rms slope that gives an rms height."""
-        return slope_of_height(slope, self.rms_height) if isinstance(slope, RmsHeight) else self.rms_slope
 
 
 class Defaults(Section):
@@ -126,6 +122,21 @@ class Campaign(Section):
         """Return the runs of a study, model by model."""
         return list(self._runs[study])
 
+    @property
+    def all_runs(self) -> list[RunLabels]:
+        """Labels of all runs, study by study and model by model, in the order of the file."""
+        return [run for study in self.studies for run in self._runs[study]]
+
+    @property
+    def used_surfaces(self) -> list[str]:
+        """Names of the surfaces that runs have, in the order of the runs."""
+        return list(dict.fromkeys(run.surface for run in self.all_runs))
+
+    @property
+    def own_studies(self) -> dict[str, Study]:
+        """Studies of the file, without those that ICHA derives from them."""
+        return {name: study for name, study in self.studies.items() if not is_derived_study(name, self.studies)}
+
     def contacts(self, study: str) -> list[RunLabels]:
         """Return the first run of a study for each surface, slope and material; other seeds and models do not count."""
         found: dict[tuple, RunLabels] = {}
@@ -149,17 +160,18 @@ class Campaign(Section):
         """Return the campaign with properties of topographies from files; numbers replace the slope `measured`."""
 
         def with_slope(run):
-            if not is_unread(run.rms_slope):
-                return run
-            return run._replace(rms_slope=topographies[run.surface].slope_of(run.rms_slope))
+            if isinstance(run.rms_slope, RmsHeight):
+                return run._replace(rms_slope=slope_of_height(run.rms_slope, topographies[run.surface].rms_height))
+            return run._replace(rms_slope=topographies[run.surface].rms_slope) if run.rms_slope == MEASURED else run
 
         campaign = self.with_runs({study: map(with_slope, runs) for study, runs in self._runs.items()})
         campaign._topographies = dict(topographies)
         return campaign
 
-    def topography(self, surface: str) -> Topography | None:
-        """Return the properties of a surface from a file; None for other surfaces."""
-        return self._topographies.get(surface)
+    @property
+    def topographies(self) -> dict[str, Topography]:
+        """Properties of the surfaces that come from files, by name; empty until the files are read."""
+        return self._topographies
 
     def origin(self, section: str, name: str) -> str:
         """Return the name of the surface or material from which a variant was made; return other names unchanged."""
@@ -183,7 +195,7 @@ class Campaign(Section):
 
     def slope_of_height(self, surface: str, rms_height: float) -> float:
         """Return the rms slope of the spectrum or the file of a surface at an rms height, m; 0 without roughness."""
-        section, topography = self.surfaces[surface], self.topography(surface)
+        section, topography = self.surfaces[surface], self.topographies.get(surface)
         if section.smooth:
             return 0.0
         unit = topography.rms_height if topography else section.rms_height_at_unit_slope
@@ -191,7 +203,7 @@ class Campaign(Section):
 
     def resolution(self, surface: str) -> Resolution:
         """Return the number of grid cells per shortest wave of a surface; its file must have been read."""
-        section, topography = self.surfaces[surface], self.topography(surface)
+        section, topography = self.surfaces[surface], self.topographies.get(surface)
         wavelength, estimated = topography.shortest_wave if topography else (math.inf, False)
         if topography is None and not section.smooth:
             wavelength = section.short_wavelength
@@ -201,7 +213,7 @@ class Campaign(Section):
 
     def _grid_and_period(self, surface):
         """Return the object with the grid and the period of a surface; both are missing if its file is not read."""
-        return self.topography(surface) or self.surfaces[surface]
+        return self.topographies.get(surface) or self.surfaces[surface]
 
     def problems(self) -> Iterator[Problem]:
         """Yield the problems that concern several values of the campaign, such as names that are not defined.
@@ -217,9 +229,10 @@ class Campaign(Section):
             yield from _within(("publication",), self.publication.problems(self))
 
     def _problems(self):
+        own = self.own_studies
         for label, study in self.studies.items():
             yield from _within(("studies", label), self._model_problems(study))
-            if is_derived_study(label, self.studies):
+            if label not in own:
                 continue  # its problems are those of the study from which it is derived
             yield from _within(("studies", label), study.problems(*self.units_of(label)))
             yield from _within(("studies", label), self._tension_problems(study))
@@ -252,18 +265,20 @@ class Campaign(Section):
 
     def _model_problems(self, study: Study) -> Iterator[Problem]:
         """Yield a problem for each surface or material that a model of the study does not support."""
-        for (index, label), name in itertools.product(enumerate(study.models), study.materials):
-            if MODELS[label].by_summits and self.materials[name].thickness is not None:
+        unsupported = []
+        for name in study.materials:
+            if self.materials[name].thickness is not None:
                 reason = f"need a half-space, because their law is that of a half-space, but {name!r} is a layer"
-                yield ("models", index), label, f"{reason}; expected [boundary_elements], or no `thickness` in {name!r}"
-            material = self.materials[name]
-            if MODELS[label].by_summits and material.adhesion_map:
+                unsupported.append(f"{reason}; expected [boundary_elements], or no `thickness` in {name!r}")
+            if self.materials[name].adhesion_map:
                 reason = f"have the same work of adhesion everywhere, but {name!r} has a map"
-                yield ("models", index), label, f"{reason}; expected [boundary_elements], or no map in {name!r}"
-        for (index, label), name in itertools.product(enumerate(study.models), study.surfaces):
-            if MODELS[label].by_summits and not self.is_flat(name):
-                reason = f"need a nominally flat surface, because they are wrong on shapes, but {name!r} has a shape"
-                yield ("models", index), label, f"{reason}; expected [boundary_elements]"
+                unsupported.append(f"{reason}; expected [boundary_elements], or no map in {name!r}")
+        for name in itertools.filterfalse(self.is_flat, study.surfaces):
+            reason = f"need a nominally flat surface, because they are wrong on shapes, but {name!r} has a shape"
+            unsupported.append(f"{reason}; expected [boundary_elements]")
+        for (index, label), reason in itertools.product(enumerate(study.models), unsupported):
+            if MODELS[label].by_summits:
+                yield ("models", index), label, reason
         for name, label in itertools.product(study.surfaces, study.materials):
             thickness, known = self.materials[label].thickness, self._grid_and_period(name)
             if (places := self.materials[label].adhesion_map) and hasattr(known, "grid"):

@@ -11,14 +11,9 @@ from icha.contact.models import DEFAULT_MODEL
 from icha.datasets.labels import RunLabels
 
 
-def run_cases(campaign: Campaign) -> list[RunLabels]:
-    """Return the labels of all runs of a campaign, study by study and model by model, in the order of the file."""
-    return [run for label in campaign.studies for run in campaign.runs(label)]
-
-
 def surface_cases(campaign: Campaign) -> list[tuple[str, int]]:
     """Return surface and seed of each topography that a campaign uses, without repetition."""
-    return list(dict.fromkeys((case.surface, case.seed) for case in run_cases(campaign)))
+    return list(dict.fromkeys((case.surface, case.seed) for case in campaign.all_runs))
 
 
 def surface_settings(campaign: Campaign, name: str) -> dict:
@@ -59,7 +54,7 @@ def _scale(campaign: Campaign, case: RunLabels) -> dict[str, float]:
 
 def adhesive_contacts(campaign: Campaign, surface: str) -> list[dict]:
     """Return all pairs of rms slope and adhesive material in the runs on a surface, without repetition."""
-    pairs = dict.fromkeys((case.rms_slope, case.material) for case in run_cases(campaign) if case.surface == surface)
+    pairs = dict.fromkeys((case.rms_slope, case.material) for case in campaign.all_runs if case.surface == surface)
     return [
         {
             "rms_slope": rms_slope,
@@ -90,7 +85,7 @@ def theories_sha256(campaign: Campaign, surface: str, seed: int) -> str:
 
 def _surface_and_file(campaign: Campaign, name: str) -> list:
     """Return the settings of a surface, and the checksum of its file if it has one."""
-    topography = campaign.topography(name)
+    topography = campaign.topographies.get(name)
     return [surface_settings(campaign, name), *([topography.sha256] if topography else [])]
 
 
@@ -100,7 +95,7 @@ def campaign_sha256(campaign: Campaign, of_run: Callable[[RunLabels], str] | Non
     `of_run` returns the checksum of a run; the default is `run_sha256`.
     """
     of_run = of_run or partial(run_sha256, campaign)
-    return _sha256({case.path: of_run(case) for case in run_cases(campaign)})
+    return _sha256({case.path: of_run(case) for case in campaign.all_runs})
 
 
 def _sha256(settings) -> str:

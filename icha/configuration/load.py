@@ -17,16 +17,10 @@ from icha.configuration.errors import ConfigurationError, format_problem, proble
 from icha.configuration.plausibility import (
     CONFIRMED,
     Unusual,
-    coarse_contacts,
-    coarse_grids,
-    long_ranges,
-    mirrored_forces,
-    negligible_loads,
+    caused_in_campaign,
     plausibility_problems,
     sticky_runs,
-    unusual_heights,
-    unusual_maps,
-    unusual_topography,
+    unusual_in_campaign,
     unusual_values,
 )
 from icha.configuration.studies import PILOT
@@ -101,16 +95,7 @@ def _load(source: Source, within: str | os.PathLike | None) -> Configuration:
     topographies, unread = inspect_topographies(campaign)
     refuse(source, itertools.chain(unread, campaign.file_problems()))
     campaign = campaign.with_topographies(topographies)
-    for name, each in topographies.items():
-        location = "surfaces", campaign.origin("surfaces", name)
-        unusual += unusual_topography(
-            location, campaign.surfaces[name], each.period, each.rms_slope, each.repeated_height
-        )
-    unusual += unusual_maps(campaign)
-    unusual += unusual_heights(campaign)
-    unusual += negligible_loads(campaign)
-    unusual += mirrored_forces(campaign)
-    unusual += coarse_grids(campaign)
+    unusual += unusual_in_campaign(campaign)
     sticky = list(sticky_runs(campaign))
     # Studies for which ICHA chooses the levels, and has not chosen yet.
     undecided = {name for name, each in campaign.studies.items() if each.accuracy is not None and each.levels is None}
@@ -126,7 +111,7 @@ def _load(source: Source, within: str | os.PathLike | None) -> Configuration:
         ]
         return replace(found, warnings=(*notes, *found.warnings))
     # Other unusual values are reported first, because they may cause the others.
-    caused = [*sticky, *coarse_contacts(campaign), *long_ranges(campaign)]
+    caused = [*sticky, *caused_in_campaign(campaign)]
     implausible = list(plausibility_problems(unusual, confirmed)) or plausibility_problems(caused, confirmed)
     unusual += caused
     refuse(source, itertools.chain(implausible, campaign.problems()))
@@ -210,8 +195,7 @@ def collect_inputs(configuration: Configuration) -> tuple[str, dict[str, str]]:
         # Defaults may contain the path of a map, which each material gets at its own place.
         content["materials"] = apply_defaults(content)["materials"]
         (content.get("defaults") or {}).pop("materials", None)
-    surfaces = {each.surface for study in campaign.studies for each in campaign.contacts(study)}
-    used = {("surfaces", campaign.origin("surfaces", name)) for name in surfaces}
+    used = {("surfaces", campaign.origin("surfaces", name)) for name in campaign.used_surfaces}
     files = {}
     for (section, name), path in named.items():
         folder, home = PurePosixPath(INPUTS, section, name), Path(path).resolve().parent

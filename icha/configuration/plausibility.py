@@ -4,6 +4,7 @@ ICHA refuses an unusual value, unless the campaign's list `confirmed` contains t
 that is confirmed causes a warning.
 """
 
+import itertools
 import math
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any, NamedTuple
@@ -14,7 +15,7 @@ from icha.configuration.campaign import Campaign
 from icha.configuration.surfaces import SelfAffineSurface
 from icha.contact.attraction import FINITE_RANGE, attraction_on, resolving_spacing
 from icha.contact.models import DEFAULT_MODEL, MODELS
-from icha.datasets.labels import RunLabels, coarse_study, is_derived_study
+from icha.datasets.labels import RunLabels, coarse_study
 from icha.path.targets import FORCE, NOMINAL_PRESSURE, QUANTITIES, UNITS
 from icha.support import formatting
 from icha.support.usual import RMS_SLOPE, SIDE, USUAL, Usual
@@ -96,7 +97,33 @@ def unusual_topography(
         yield Unusual((*location, key), f"rms slope {rms_slope:.3g}", RMS_SLOPE, source)
 
 
-def unusual_maps(campaign: Campaign) -> Iterator[Unusual]:
+def unusual_in_campaign(campaign: Campaign) -> Iterator[Unusual]:
+    """Yield the unusual values of a campaign that its text does not show, and that no other unusual value causes.
+
+    Of each study, the first value of each kind counts.
+    """
+    for name, each in campaign.topographies.items():
+        location = "surfaces", campaign.origin("surfaces", name)
+        section = campaign.surfaces[name]
+        yield from unusual_topography(location, section, each.period, each.rms_slope, each.repeated_height)
+    yield from _unusual_maps(campaign)
+    yield from _first_of_each_study(campaign, _unusual_heights, _negligible_loads, _mirrored_forces)
+    yield from _coarse_grids(campaign)
+
+
+def caused_in_campaign(campaign: Campaign) -> Iterator[Unusual]:
+    """Yield the unusual values of a campaign that other unusual values may cause, other than its sticky runs."""
+    yield from _first_of_each_study(campaign, _coarse_contacts)
+    yield from _long_ranges(campaign)
+
+
+def _first_of_each_study(campaign, *checks):
+    """Yield the first value that each check finds in each study of the user."""
+    for check, name in itertools.product(checks, campaign.own_studies):
+        yield from itertools.islice(check(campaign, name), 1)
+
+
+def _unusual_maps(campaign: Campaign) -> Iterator[Unusual]:
     """Yield the mean of each map of works of adhesion if it is unusual."""
     for name, section in campaign.materials.items():
         if section.adhesion_map and not USUAL["surface_energy"].contains(section.surface_energy):
@@ -115,57 +142,46 @@ def plausibility_problems(
             yield each.location, each.value, f"{reason}{addition.format(each.key)} if you intend this value"
 
 
-def unusual_heights(campaign: Campaign) -> Iterator[Unusual]:
-    """For each study with rms heights, yield the first height that gives an unusual rms slope."""
-    for name, study in campaign.studies.items():
-        if study.rms_heights is None or is_derived_study(name, campaign.studies):
-            continue
-        for contact in campaign.contacts(name):
-            if not campaign.surfaces[contact.surface].smooth and not RMS_SLOPE.contains(contact.rms_slope):
-                heights = ", ".join(map(formatting.length, study.rms_heights))
-                source = f" on {contact.surface}, where the rms slope is {contact.rms_slope:.3g}"
-                yield Unusual(("studies", name, "rms_heights"), heights, RMS_SLOPE, source)
-                break
+def _unusual_heights(campaign: Campaign, name: str) -> Iterator[Unusual]:
+    """Yield the rms heights of a study that give an unusual rms slope."""
+    for contact in campaign.contacts(name):
+        heights, section = campaign.studies[name].rms_heights, campaign.surfaces[contact.surface]
+        if heights and not section.smooth and not RMS_SLOPE.contains(contact.rms_slope):
+            source = f" on {contact.surface}, where the rms slope is {contact.rms_slope:.3g}"
+            location = "studies", name, "rms_heights"
+            yield Unusual(location, ", ".join(map(formatting.length, heights)), RMS_SLOPE, source)
 
 
-def negligible_loads(campaign: Campaign) -> Iterator[Unusual]:
-    """For each study, yield the first pressure or force whose reduced pressure is less than 1e-9 for every contact."""
-    for name, study in campaign.studies.items():
-        if is_derived_study(name, campaign.studies):
-            continue
-        pressure, force, _ = campaign.units_of(name)
-        units = {NOMINAL_PRESSURE: pressure, FORCE: force}
-        for location, kind, value in study.states():
-            unit = units.get(kind, math.inf)
-            if unit < math.inf and 0 < abs(value) < _LEAST_REDUCED_PRESSURE * unit:
-                least = formatting.format_quantity(_LEAST_REDUCED_PRESSURE * unit, UNITS[kind])
-                expected = f"0, or at least {least} (a reduced pressure of {_LEAST_REDUCED_PRESSURE:g})"
-                shown = formatting.format_quantity(value, UNITS[kind])
-                source = f" (a reduced pressure of {value / unit:.3g})"
-                yield Unusual(("studies", name, *location), shown, expected, source)
-                break
+def _negligible_loads(campaign: Campaign, name: str) -> Iterator[Unusual]:
+    """Yield the pressures and forces of a study whose reduced pressure is less than 1e-9 for every contact."""
+    pressure, force, _ = campaign.units_of(name)
+    units = {NOMINAL_PRESSURE: pressure, FORCE: force}
+    for location, kind, value in campaign.studies[name].states():
+        unit = units.get(kind, math.inf)
+        if unit < math.inf and 0 < abs(value) < _LEAST_REDUCED_PRESSURE * unit:
+            least = formatting.format_quantity(_LEAST_REDUCED_PRESSURE * unit, UNITS[kind])
+            expected = f"0, or at least {least} (a reduced pressure of {_LEAST_REDUCED_PRESSURE:g})"
+            shown = formatting.format_quantity(value, UNITS[kind])
+            yield Unusual(("studies", name, *location), shown, expected, f" (a reduced pressure of {value / unit:.3g})")
 
 
-def mirrored_forces(campaign: Campaign) -> Iterator[Unusual]:
-    """For each study, yield the first force on a mirrored scan; it acts on the four copies of the scan in the cell."""
-    for name, study in campaign.studies.items():
-        used = dict.fromkeys(contact.surface for contact in campaign.contacts(name))
-        mirrored = (each for each in used if campaign.surfaces[each].boundary == MIRROR)
-        force = next(((location, value) for location, kind, value in study.states() if kind == FORCE), None)
-        if (surface := next(mirrored, None)) is None or force is None or is_derived_study(name, campaign.studies):
-            continue
-        pressure = 4 * force[1] / campaign.period(surface) ** 2
+def _mirrored_forces(campaign: Campaign, name: str) -> Iterator[Unusual]:
+    """Yield the forces of a study on a mirrored scan; they act on the four copies of the scan in the cell."""
+    mirrored = (each.surface for each in campaign.contacts(name) if campaign.surfaces[each.surface].boundary == MIRROR)
+    forces = ((location, value) for location, kind, value in campaign.studies[name].states() if kind == FORCE)
+    for surface, (location, force) in itertools.product(mirrored, forces):
+        pressure = formatting.format_quantity(4 * force / campaign.period(surface) ** 2, "Pa")
         source = f" on {surface}, because a mirrored cell contains four copies of the scan, which share the force"
-        expected = f"a pressure, such as {formatting.format_quantity(pressure, 'Pa')} for this force on one scan"
-        yield Unusual(("studies", name, *force[0]), formatting.format_quantity(force[1], "N"), expected, source)
+        expected = f"a pressure, such as {pressure} for this force on one scan"
+        yield Unusual(("studies", name, *location), formatting.format_quantity(force, "N"), expected, source)
 
 
-def coarse_grids(campaign: Campaign) -> Iterator[Unusual]:
+def _coarse_grids(campaign: Campaign) -> Iterator[Unusual]:
     """Yield the grid of each surface whose shortest wave has too few cells, the coarsest grid of its variants."""
     found: dict[str, tuple[float, Unusual]] = {}
     levels = [coarse for label in campaign.studies if (coarse := coarse_study(label)) in campaign.studies]
     halves = {contact.surface for label in levels for contact in campaign.contacts(label)}
-    for name in dict.fromkeys(each.surface for study in campaign.studies for each in campaign.contacts(study)):
+    for name in campaign.used_surfaces:
         resolution = campaign.resolution(name)
         origin, section, grid = campaign.origin("surfaces", name), campaign.surfaces[name], campaign.grid(name)
         if resolution.reaches(LEAST_CELLS) or found.get(origin, (math.inf,))[0] <= resolution.cells:
@@ -195,35 +211,31 @@ def _kept_outliers(section):
     return defects_of(read_topography(section).square).description_of_outliers
 
 
-def coarse_contacts(campaign: Campaign) -> Iterator[Unusual]:
-    """For each study, yield the smallest target if there the contact of a smooth shape has too few cells."""
-    for name, study in campaign.studies.items():
-        if is_derived_study(name, campaign.studies):
+def _coarse_contacts(campaign: Campaign, name: str) -> Iterator[Unusual]:
+    """Yield the smallest target of a study for each contact of a smooth shape that there has too few cells."""
+    for contact in campaign.runs(name):
+        if not (MODELS[contact.model].by_cells and campaign.surfaces[contact.surface].smooth):
             continue
-        for contact in campaign.runs(name):
-            if not (MODELS[contact.model].by_cells and campaign.surfaces[contact.surface].smooth):
-                continue
-            resolution = resolution_of_smooth(campaign, name, contact)
-            if not resolution.reaches(LEAST_CELLS):
-                kind, value = study.targets.states[0]
-                source = f" ({resolution} for {contact.material} on {contact.surface})"
-                shown = formatting.format_quantity(value, UNITS[kind]) if kind in UNITS else value
-                expected = f"larger targets, or {resolution.grids(campaign.grid(contact.surface))}"
-                yield Unusual(("studies", name, "targets", QUANTITIES[kind].plural), shown, expected, source)
-                break
+        resolution = resolution_of_smooth(campaign, contact)
+        if not resolution.reaches(LEAST_CELLS):
+            kind, value = campaign.studies[name].targets.states[0]
+            source = f" ({resolution} for {contact.material} on {contact.surface})"
+            shown = formatting.format_quantity(value, UNITS[kind]) if kind in UNITS else value
+            expected = f"larger targets, or {resolution.grids(campaign.grid(contact.surface))}"
+            yield Unusual(("studies", name, "targets", QUANTITIES[kind].plural), shown, expected, source)
 
 
-def resolution_of_smooth(campaign: Campaign, study: str, contact: RunLabels) -> Resolution:
-    """Return the number of cells in the smallest contact radius of a smooth shape at the targets of a study."""
+def resolution_of_smooth(campaign: Campaign, contact: RunLabels) -> Resolution:
+    """Return the number of cells in the smallest contact radius of a smooth shape at the targets of its study."""
     from icha.references.limits import contact_resolution  # imports SciPy, which takes time
 
     section = campaign.surfaces[contact.surface]
     material = campaign.materials[contact.material].material
-    targets = campaign.studies[study].targets.states
+    targets = campaign.studies[contact.study].targets.states
     return contact_resolution(section.shape.shape, section.side, section.grid, material, targets)
 
 
-def long_ranges(campaign: Campaign) -> Iterator[Unusual]:
+def _long_ranges(campaign: Campaign) -> Iterator[Unusual]:
     """For each material, yield the range of attraction if boundary elements badly assume a short range."""
     found: dict[str, tuple[float, Unusual]] = {}
     for name in campaign.studies:
@@ -263,7 +275,7 @@ def rms_curvature(campaign: Campaign, contact: RunLabels) -> float:
     if isinstance(section, SelfAffineSurface):
         moments = self_affine_moments(*section.lengths_and_hurst)
         return math.sqrt(moments.m4 / (2 * moments.m2)) * contact.rms_slope
-    return campaign.topography(contact.surface).rms_curvature * contact.rms_slope
+    return campaign.topographies[contact.surface].rms_curvature * contact.rms_slope
 
 
 _TOO_STICKY = f"{FULL_CONTACT_BELOW:g} to inf (for smaller values full contact has a lower energy than separated "
@@ -284,7 +296,7 @@ def energy_ratio(campaign: Campaign, contact) -> float:
     if isinstance(surface, SelfAffineSurface):
         energy = self_affine_full_contact_energy(*surface.lengths_and_hurst)
     else:
-        energy = campaign.topography(contact.surface).full_contact_energy
+        energy = campaign.topographies[contact.surface].full_contact_energy
     energy *= contact.rms_slope**2
     return full_contact_energy_ratio(energy, material.contact_modulus, material.surface_energy)
 
@@ -296,8 +308,7 @@ def sticky_runs(campaign: Campaign) -> Iterator[Unusual]:
             continue
         ratios = {contact: energy_ratio(campaign, contact) for contact in campaign.contacts(name)}
         lowest = min(ratios, key=ratios.get)
-        if ratios[lowest] < FULL_CONTACT_BELOW:
+        if (ratio := ratios[lowest]) < FULL_CONTACT_BELOW:
             source = f" for {lowest.material} on {lowest.surface} at rms slope {lowest.rms_slope:.3g}"
-            value = f"asperities with U_full/dgamma = {ratios[lowest]:.3g}"
             key, usual = ("models", _RATIO) if study.levels is None else ("levels", _RATIO_OF_LEVELS)
-            yield Unusual(("studies", name, key), value, usual, source)
+            yield Unusual(("studies", name, key), f"asperities with U_full/dgamma = {ratio:.3g}", usual, source)

@@ -29,10 +29,9 @@ if TYPE_CHECKING:
 
 def inspect_topographies(campaign: Campaign) -> tuple[dict[str, Topography], list[Problem]]:
     """Return the properties of those surfaces of studies that come from files, and the problems of these files."""
-    contacts = [each for study in campaign.studies for each in campaign.contacts(study)]
-    of_measured_slope = {each.surface for each in contacts if each.rms_slope == MEASURED}
+    of_measured_slope = {run.surface for run in campaign.all_runs if run.rms_slope == MEASURED}
     facts, problems = {}, []
-    for name in dict.fromkeys(each.surface for each in contacts if campaign.surfaces[each.surface].from_file):
+    for name in (name for name in campaign.used_surfaces if campaign.surfaces[name].from_file):
         surface = campaign.surfaces[name]
         try:
             facts[name] = inspect_file(surface)

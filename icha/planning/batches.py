@@ -8,6 +8,7 @@ stay the same.
 """
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from functools import cache
 from typing import NamedTuple, TypeVar
 
@@ -23,6 +24,8 @@ from icha.planning.run_costs import run_costs
 _SHORT_BATCHES, _SHORT = 4, 0.2
 # Expected time of a figure, s.
 _FIGURE = 1.6
+# Snakemake reserves this multiple of the expected memory, and this memory in addition, MB.
+_MARGIN, _UNEXPECTED = 1.25, 400
 # Largest number of files in a batch. For each input, Snakemake searches the list of outputs of the batch.
 _MOST_FILES = 180
 T = TypeVar("T")
@@ -36,24 +39,26 @@ class Batch(NamedTuple):
     name : name of the batch; names differ among the batches of one kind of file.
     files : paths of the files, or names of the figures.
     seconds : expected time of the computations, s.
+    memory : memory that Snakemake reserves, MB.
     """
 
     name: str
     files: list[str]
     seconds: float
+    memory: int
 
 
 def surface_batches(campaign: Campaign, surfaces: Mapping[str, tuple[str, int]]) -> list[Batch]:
     """Return the batches of surfaces; `surfaces` has name and seed of each surface by path."""
     return _divide(
-        (path, f"surfaces{_large(surface_threads(campaign, name))}", costs.surface_cost(campaign.grid(name)).seconds)
+        (path, f"surfaces{_large(surface_threads(campaign, name))}", costs.surface_cost(campaign.grid(name)))
         for path, (name, _) in _by_seed(surfaces, lambda surface: surface)
     )
 
 
 def theory_batches(theories: Mapping[str, str]) -> list[Batch]:
     """Return the batches of files of theories; `theories` has the name of the surface by path."""
-    return _divide((path, "theories", costs.analysis_cost(0.0, 0.0).seconds) for path in theories)
+    return _divide((path, "theories", costs.analysis_cost(0.0, 0.0)) for path in theories)
 
 
 def run_batches(campaign: Campaign, runs: Mapping[str, RunLabels]) -> list[Batch]:
@@ -61,20 +66,26 @@ def run_batches(campaign: Campaign, runs: Mapping[str, RunLabels]) -> list[Batch
     cost_of = run_costs(campaign)
 
     @cache
-    def group_and_seconds(contact):
-        seconds = costs.BATCH if is_resumable(campaign, contact) else 0.0
-        return f"{contact.study}_{contact.model}{_large(run_threads(campaign, contact))}", seconds
+    def group_and_cost(contact):
+        cost, group = cost_of[contact], f"{contact.study}_{contact.model}{_large(run_threads(campaign, contact))}"
+        return group, replace(cost, seconds=max(cost.seconds, costs.BATCH)) if is_resumable(campaign, contact) else cost
 
+    return _divide((path, *group_and_cost(case)) for path, case in _by_seed(runs, lambda case: (case.study, case.seed)))
+
+
+def figure_batches(nodes: Mapping[str, int]) -> list[Batch]:
+    """Return the batches of figures; `nodes` has the number of nodes of the topography that a figure holds, by name.
+
+    An own figure is alone, because its script may fail.
+    """
     return _divide(
-        (path, group, max(cost_of[case].seconds, seconds))
-        for path, case in _by_seed(runs, lambda case: (case.study, case.seed))
-        for group, seconds in [group_and_seconds(case._replace(seed=0))]
+        (
+            name,
+            "figures" if figure_number(name) else f"figure_{name}",
+            replace(costs.figure_cost(0.0, n), seconds=_FIGURE),
+        )
+        for name, n in nodes.items()
     )
-
-
-def figure_batches(names: Iterable[str]) -> list[Batch]:
-    """Return the batches of figures, by name. An own figure is alone, because its script may fail."""
-    return _divide((name, "figures" if figure_number(name) else f"figure_{name}", _FIGURE) for name in names)
 
 
 def _by_seed(files: Mapping[str, T], labels: Callable[[T], tuple[str, int]]) -> list[tuple[str, T]]:
@@ -96,19 +107,14 @@ def _large(threads: int) -> str:
     return "_large" if threads > 1 else ""
 
 
-def _divide(files: Iterable[tuple[str, str, float]]) -> list[Batch]:
-    """Divide files into batches; each file is given as path, group and expected time, s."""
-    groups: dict[str, list[tuple[str, float]]] = {}
-    for path, group, seconds in files:
-        groups.setdefault(group, []).append((path, seconds))
-    batches = []
-    for group, members in groups.items():
-        of_group: list[Batch] = []
-        for path, seconds in members:
-            longest = costs.BATCH * (_SHORT if len(of_group) <= _SHORT_BATCHES else 1)
-            if not of_group or of_group[-1].seconds + seconds > longest or len(of_group[-1].files) == _MOST_FILES:
-                of_group.append(Batch(f"{group}_{len(of_group)}", [], 0.0))
-            last = of_group[-1]
-            of_group[-1] = last._replace(files=[*last.files, path], seconds=last.seconds + seconds)
-        batches += of_group
-    return batches
+def _divide(files: Iterable[tuple[str, str, costs.Cost]]) -> list[Batch]:
+    """Divide files into batches; each file is given as path, group and expected cost."""
+    groups: dict[str, list[Batch]] = {}
+    for path, group, cost in files:
+        batches, memory = groups.setdefault(group, []), int(_MARGIN * cost.memory / 1e6 + _UNEXPECTED)
+        longest = costs.BATCH * (_SHORT if len(batches) <= _SHORT_BATCHES else 1)
+        if not batches or batches[-1].seconds + cost.seconds > longest or len(batches[-1].files) == _MOST_FILES:
+            batches.append(Batch(f"{group}_{len(batches)}", [], 0.0, 0))
+        name, paths, seconds, most = batches[-1]
+        batches[-1] = Batch(name, [*paths, path], seconds + cost.seconds, max(most, memory))
+    return [batch for batches in groups.values() for batch in batches]

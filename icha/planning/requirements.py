@@ -1,9 +1,9 @@
-"""Requirements of jobs, which Snakemake reserves: cores, memory and time limits."""
+"""Requirements of jobs, which Snakemake reserves: cores and time limits. `icha.planning.batches` has the memory."""
 
 from icha.configuration.campaign import Campaign
 from icha.contact.models import MODELS
 from icha.datasets.labels import RunLabels
-from icha.planning.costs import MAP_ARRAYS, RUN_SIZES, is_large
+from icha.planning.costs import RUN_SIZES, is_large
 
 
 def surface_threads(campaign: Campaign, surface: str) -> int:
@@ -19,27 +19,6 @@ def run_threads(campaign: Campaign, case: RunLabels) -> int:
 def is_resumable(campaign: Campaign, case: RunLabels) -> bool:
     """Return whether a run takes so long that it saves checkpoints."""
     return MODELS[case.model].resumable and is_large(campaign.grid(case.surface))
-
-
-def _megabytes(program: float, arrays: float, nodes: int) -> int:
-    """Return the memory of a job in MB: `program`, plus `arrays` arrays that have nodes x nodes numbers each."""
-    return int(program + arrays * 8e-6 * nodes**2)
-
-
-def surface_memory(campaign: Campaign, surface: str) -> int:
-    """Return the memory that Snakemake reserves for generating a surface, MB."""
-    return _megabytes(600, 4, campaign.grid(surface))
-
-
-def run_memory(campaign: Campaign, case: RunLabels) -> int:
-    """Return the memory that Snakemake reserves for a run, MB."""
-    arrays = max(4, 1.25 * RUN_SIZES[case.model].arrays)
-    return _megabytes(600, arrays, campaign.grid(case.surface))
-
-
-def figure_memory(campaign: Campaign, *, holds_topography: bool) -> int:
-    """Return the memory that Snakemake reserves for a figure, MB; drawing a topography needs more memory."""
-    return _megabytes(1000, MAP_ARRAYS * holds_topography, largest_grid(campaign))
 
 
 def largest_grid(campaign: Campaign) -> int:

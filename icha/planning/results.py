@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from icha.configuration.campaign import Campaign
-from icha.configuration.cases import run_cases, run_sha256, surface_cases, surface_sha256, theories_sha256
+from icha.configuration.cases import run_sha256, surface_cases, surface_sha256, theories_sha256
 from icha.contact.models import REFERENCE_MODEL
 from icha.datasets import results
 from icha.datasets.labels import RunLabels
@@ -80,7 +80,7 @@ def campaign_files(campaign: Campaign, folder: str = "") -> CampaignFiles:
         return {path(pattern, case): case for case in cases}
 
     surfaces = surface_cases(campaign)
-    runs = each(results.RUN, run_cases(campaign))
+    runs = each(results.RUN, campaign.all_runs)
     compared = {
         file: case
         for file, case in runs.items()

@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 
 from icha.configuration.campaign import Campaign
-from icha.configuration.cases import run_cases, run_settings
+from icha.configuration.cases import run_settings
 from icha.configuration.plausibility import energy_ratio
 from icha.datasets.labels import RunLabels
 from icha.path.targets import QUANTITIES
@@ -32,7 +32,7 @@ def run_costs(campaign: Campaign) -> dict[RunLabels, costs.Cost]:
         return 1 if campaign.surfaces[surface].shape else surface_facts(campaign, surface)["summits"]
 
     cost = cache(lambda case: expected_cost(campaign, case, summits(case.surface)))
-    return {case: cost(case._replace(seed=0)) for case in run_cases(campaign)}
+    return {case: cost(case._replace(seed=0)) for case in campaign.all_runs}
 
 
 def corrected_costs(campaign: Campaign, results: Path) -> dict[RunLabels, costs.Cost]:

@@ -8,13 +8,11 @@ from icha.asperity.material import VAN_DER_WAALS_RANGE, WU_HOLDS_FROM
 from icha.asperity.stickiness import stickiness, sticky_rms_height
 from icha.asperity.tabor import describe_short_range
 from icha.configuration.campaign import Campaign
-from icha.configuration.cases import run_cases
 from icha.configuration.plausibility import energy_ratio, resolution_of_smooth, rms_curvature, tabor_parameter
 from icha.configuration.surfaces import SelfAffineSurface
 from icha.configuration.topographies import read_surface
 from icha.contact.attraction import straight_strength
 from icha.contact.models import MODELS
-from icha.datasets.labels import is_derived_study
 from icha.planning.statements import (
     COMPLETE_PRESSURE,
     DIRECTION,
@@ -76,7 +74,7 @@ def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
         anisotropy, free = slope_anisotropy(surface), surface.free
         found = locate_summits(surface)
         summits, unsupported = len(found), len(found.unsupported_height)
-        complete = campaign.topography(name).complete_contact_pressure
+        complete = campaign.topographies[name].complete_contact_pressure
     every = summits + unsupported
     return {
         "slope_anisotropy": anisotropy,
@@ -95,7 +93,7 @@ def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
 def expected_validity(campaign: Campaign) -> list[Statement]:
     """Return statements about the expected validity of the models; Tabor parameters are those of the mean summit."""
     facts_of = cache(lambda surface: surface_facts(campaign, surface))
-    cases, tabor, sticky, loops = [], {}, {}, {}
+    own, cases, tabor, sticky, loops = campaign.own_studies, [], {}, {}, {}
 
     def resolved_tension(case):
         """Return strength, largest tension that the grid resolves, and spacing, of boundary elements."""
@@ -107,13 +105,13 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
         return {STRENGTH: material.receding.interface_strength, RESOLVED: tension, SPACING: spacing}
 
     # Contacts that differ only in the seed have the same expected properties.
-    for case in dict.fromkeys(case._replace(seed=0) for case in run_cases(campaign)):
-        if is_derived_study(case.study, campaign.studies):
+    for case in dict.fromkeys(case._replace(seed=0) for case in campaign.all_runs):
+        if case.study not in own:
             continue  # runs whose error the estimates correct
         value = tabor_parameter(campaign, case)
         range_of_attraction = {} if value is None else {TABOR: value}
         if campaign.surfaces[case.surface].smooth:
-            resolution = min(resolution_of_smooth(campaign, case.study, case), campaign.resolution(case.surface))
+            resolution = min(resolution_of_smooth(campaign, case), campaign.resolution(case.surface))
             known = {"full_contact_energy_ratio": math.inf} | range_of_attraction | resolved_tension(case)
             cases.append(Case(case.model, case.surface, case.material, known, resolution))
             continue
@@ -153,9 +151,7 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
             value = stickiness(SpectralMoments(0.0, case.rms_slope**2 / 2, curvature**2), material)
             key = case.surface, case.material
             sticky[key] = max(value, sticky.get(key, 0.0))
-    models = {
-        name: study.models for name, study in campaign.studies.items() if not is_derived_study(name, campaign.studies)
-    }
+    models = {name: study.models for name, study in own.items()}
     outside = _describe_outside(tabor) if tabor else None
     stated = statements(models, cases, outside, describe_sticky(sticky), loops)
     return [*stated, *_default_ranges(campaign), *_indenters(campaign)]
@@ -163,7 +159,7 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
 
 def _default_ranges(campaign):
     """Yield a statement if materials with adhesion have the default range of attraction."""
-    used = dict.fromkeys(case.material for case in run_cases(campaign))
+    used = dict.fromkeys(case.material for case in campaign.all_runs)
     names = [
         name
         for name in used
@@ -182,11 +178,9 @@ def _default_ranges(campaign):
 
 def _indenters(campaign):
     """Yield a statement for each shape and material: the contact of the smooth shape by theory, beside the square."""
-    largest, layers, unloaded = {}, {}, set()
-    for study, surface, name in dict.fromkeys(
-        (case.study, case.surface, case.material) for case in run_cases(campaign)
-    ):
-        if campaign.surfaces[surface].shape and not is_derived_study(study, campaign.studies):
+    own, largest, layers, unloaded = campaign.own_studies, {}, {}, set()
+    for study, surface, name in dict.fromkeys((case.study, case.surface, case.material) for case in campaign.all_runs):
+        if campaign.surfaces[surface].shape and study in own:
             radii = campaign.contact_radii(campaign.studies[study], surface, name).values()
             largest[surface, name] = max(0.0, *radii, largest.get((surface, name), 0.0))
             unloaded |= {(surface, name)} if campaign.studies[study].unload else set()

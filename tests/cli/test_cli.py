@@ -20,7 +20,7 @@ from typer.testing import CliRunner
 from icha.cli import app
 from icha.cli.progress import Progress
 from icha.cli.project import list_campaigns
-from icha.configuration.cases import campaign_sha256, run_cases
+from icha.configuration.cases import campaign_sha256
 from icha.configuration.load import load_configuration
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import write_dataset
@@ -142,7 +142,7 @@ def test_the_examples_in_the_comments_of_a_new_campaign_are_valid(project):
         example = [line.replace("# ", "", 1) for line in (start + after).splitlines()[:lines]]
         file = CAMPAIGNS / "example.yaml"
         file.write_text(before + "\n".join([*example, *after.splitlines()[lines:]]))
-        assert run_cases(load_configuration(file).campaign), start
+        assert load_configuration(file).campaign.all_runs, start
 
 
 def test_a_measured_file_fills_in_what_it_contains(project):

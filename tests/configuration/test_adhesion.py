@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import icha
-from icha.configuration.cases import campaign_sha256, run_cases, run_settings
+from icha.configuration.cases import campaign_sha256, run_settings
 from icha.configuration.errors import ConfigurationError
 from icha.configuration.load import collect_inputs, load_configuration
 
@@ -17,7 +17,7 @@ MAP = np.random.default_rng(1).uniform(10, 50, (80, 80))
 
 
 def material_of(campaign):
-    return icha.Material(**run_settings(campaign, run_cases(campaign)[0])["material"])
+    return icha.Material(**run_settings(campaign, campaign.all_runs[0])["material"])
 
 
 def test_works_of_adhesion_reach_the_material_of_a_run(load):

@@ -9,7 +9,6 @@ import icha
 from icha.asperity.material import VAN_DER_WAALS_RANGE
 from icha.configuration.cases import (
     campaign_sha256,
-    run_cases,
     run_settings,
     run_sha256,
     surface_cases,
@@ -18,13 +17,14 @@ from icha.configuration.cases import (
 from icha.configuration.design import sampled_parameters, varied_values
 from icha.configuration.errors import ConfigurationError
 from icha.datasets.labels import inputs_study
+from icha.planning.batches import run_batches
 from icha.planning.plan import RUNS, plan
-from icha.planning.requirements import run_memory, run_minutes
+from icha.planning.requirements import run_minutes
 from icha.planning.results import campaign_files
 
 
 def paths(campaign):
-    return [case.path.removeprefix("one/") for case in run_cases(campaign)]
+    return [case.path.removeprefix("one/") for case in campaign.all_runs]
 
 
 def test_random_surfaces_and_files_share_a_study(load, tmp_path):
@@ -43,7 +43,7 @@ def test_parameters_are_varied_each_with_each(load):
         for hurst in ("0.6", "0.8")
         for energy in ("5mJ", "10mJ")
     ]
-    case = run_cases(campaign)[-1]
+    case = campaign.all_runs[-1]
     assert surface_settings(campaign, case.surface)["hurst"] == 0.8
     assert surface_settings(campaign, case.surface)["grid"] == 96
     assert run_settings(campaign, case)["material"]["surface_energy"] == 0.01
@@ -69,7 +69,7 @@ def test_the_preparation_of_a_measured_surface_is_varied(load):
         "studies.one.rms_slopes": "measured",
         "studies.one.vary": {"detrend": ["tilt", "curvature"], "boundary": ["mirror", "free"]},
     }
-    cases = run_cases(load(changes).campaign)
+    cases = load(changes).campaign.all_runs
     assert [case.surface for case in cases] == [
         f"rough-detrend{detrend}-boundary{boundary}"
         for detrend in ("tilt", "curvature")
@@ -88,7 +88,7 @@ def test_bodies_give_the_contact_modulus_and_the_ratio_of_a_layer(load):
         for key, value in keys.items():
             changes[f"materials.soft.{key}"] = value
         campaign = load(changes).campaign
-        return run_settings(campaign, run_cases(campaign)[0])["material"]
+        return run_settings(campaign, campaign.all_runs[0])["material"]
 
     both = material(bodies=[rubber, glass])
     assert both["contact_modulus"] == pytest.approx(1 / (0.75 / 2e6 + 0.96 / 70e9), rel=1e-14)
@@ -101,7 +101,7 @@ def test_bodies_give_the_contact_modulus_and_the_ratio_of_a_layer(load):
 def test_the_youngs_modulus_of_a_body_can_be_given_alone_and_varied(load):
     def materials(changes):
         campaign = load({"materials.soft.contact_modulus": None} | changes).campaign
-        return [run_settings(campaign, case)["material"] for case in run_cases(campaign)]
+        return [run_settings(campaign, case)["material"] for case in campaign.all_runs]
 
     alone = {"materials.soft.youngs_modulus": "2 MPa", "materials.soft.poisson_ratio": 0.4}
     assert materials(alone)[0]["contact_modulus"] == pytest.approx(2e6 / 0.84, rel=1e-14)
@@ -121,7 +121,7 @@ def test_levels_are_runs_of_both_models_and_a_study_on_half_the_grid(load):
     configuration = load(ON_LEVELS)
     campaign = configuration.campaign
     assert configuration.warnings == ()
-    assert [(case.study, case.model, case.surface, case.seed) for case in run_cases(campaign)] == [
+    assert [(case.study, case.model, case.surface, case.seed) for case in campaign.all_runs] == [
         *(("one", "asperities", "rough", seed) for seed in (1, 2, 3, 4)),
         *(("one", "boundary_elements", "rough", seed) for seed in (1, 2)),
         *(("one-coarse", "boundary_elements", "rough-grid40", seed) for seed in (1, 2, 3)),
@@ -131,7 +131,7 @@ def test_levels_are_runs_of_both_models_and_a_study_on_half_the_grid(load):
 
 def test_an_error_check_adds_boundary_elements_for_the_first_seed_of_each_contact(load):
     campaign = load({"studies.one.error_check": True, "studies.one.seeds": [3, 1, 2]}).campaign
-    found = [(case.model, case.seed, case.rms_slope) for case in run_cases(campaign)]
+    found = [(case.model, case.seed, case.rms_slope) for case in campaign.all_runs]
     assert len(found) == 6 + 2 and found[6:] == [("boundary_elements", 3, 0.2), ("boundary_elements", 3, 1.0)]
     assert campaign.compares_models("one")
 
@@ -157,20 +157,20 @@ def test_defaults_serve_entries_that_do_not_give_their_own(load, tmp_path):
     assert campaign.surfaces["own"].period == 1e-4
     assert campaign.materials["hard"].surface_energy == 1e-3
     assert campaign.materials["soft"].surface_energy == 0.05
-    assert len(run_cases(campaign)) == 3 * 2 * 2
+    assert len(campaign.all_runs) == 3 * 2 * 2
     with pytest.raises(ConfigurationError, match=r"defaults\.materials\.interaction_range: '2 m\^2'"):
         load({**changes, "defaults": {"materials": {"interaction_range": "2 m^2", "surface_energy": "1 mJ/m^2"}}})
 
 
 def test_a_study_is_a_product_of_its_lists(load):
     campaign = load().campaign
-    assert [case.path for case in run_cases(campaign)] == [
+    assert [case.path for case in campaign.all_runs] == [
         "one/rough/seed1/slope0.2/soft",
         "one/rough/seed1/slope1/soft",
         "one/rough/seed2/slope0.2/soft",
         "one/rough/seed2/slope1/soft",
     ]
-    settings = run_settings(campaign, run_cases(campaign)[0])
+    settings = run_settings(campaign, campaign.all_runs[0])
     assert settings["material"] == {"contact_modulus": 25e6, "surface_energy": 0.05, "interaction_range": 2.071e-9}
     assert settings["path"] == {
         "reduced_pressures": [1e-3, 0.01],
@@ -186,13 +186,13 @@ def test_every_stop_is_the_same_as_all_of_them_one_by_one(load):
         load({"studies.one.targets": {"area_fractions": areas}, "studies.one.snapshots": snapshots}).campaign
         for snapshots in ("every_stop", listed)
     )
-    assert run_settings(one, run_cases(one)[0])["path"]["snapshots"] == [("area_fraction", area) for area in areas]
+    assert run_settings(one, one.all_runs[0])["path"]["snapshots"] == [("area_fraction", area) for area in areas]
     assert campaign_sha256(one) == campaign_sha256(other)
 
 
 def test_settings_depend_on_values_not_on_how_they_are_written(load):
     def checksum(campaign):
-        return run_sha256(campaign, run_cases(campaign)[0]), campaign_sha256(campaign)
+        return run_sha256(campaign, campaign.all_runs[0]), campaign_sha256(campaign)
 
     first = checksum(load().campaign)
     assert checksum(load({"materials.soft.contact_modulus": "25000 kPa", "title": "Other"}).campaign) == first
@@ -204,7 +204,7 @@ def test_settings_depend_on_values_not_on_how_they_are_written(load):
 def test_another_file_of_the_same_name_is_another_run(load, tmp_path):
     def checksum():
         campaign = load({"surfaces.rough": file_surface("own.npy"), "confirmed": ["surfaces.rough.path"]}).campaign
-        return run_sha256(campaign, run_cases(campaign)[0])
+        return run_sha256(campaign, campaign.all_runs[0])
 
     heights = np.random.default_rng(1).random((16, 16))
     np.save(tmp_path / "own.npy", heights)
@@ -221,7 +221,7 @@ def test_unloading_its_turning_points_and_snapshots_are_part_of_the_path(load):
     study = {"studies.one.unload": True, "studies.one.snapshots": snapshots, "studies.one.turning_points": turns}
     figure = {"figures": {"fig4_contact_map": {"study": "one", "snapshot": snapshots[1]}}}
     campaign = load(study | figure).campaign
-    path = run_settings(campaign, run_cases(campaign)[0])["path"]
+    path = run_settings(campaign, campaign.all_runs[0])["path"]
     assert path["snapshots"] == [("area_fraction", 0.01), ("unloading_area_fraction", 0.01)]
     assert path["unload"] is True and path["control"] == "separation"
     assert path["turning_points"] == [("reduced_pressure", -1e-3), ("area_fraction", 0.03)]
@@ -247,7 +247,7 @@ def drawn(campaign, label="one"):
 def test_each_case_is_a_contact_with_the_values_drawn(load):
     campaign = load(ONE).campaign
     cases, values = drawn(campaign)
-    runs = run_cases(campaign)
+    runs = campaign.all_runs
     assert len(cases) == 64 and len(runs) == 128
     assert runs[0].path == "one/rough-one-case0/seed1/slope0.5/soft-one-case0"
     for k in (0, 17, 63):
@@ -281,14 +281,14 @@ def test_rms_slopes_can_be_sampled(load):
     campaign = load(ONE | {"studies.one.rms_slopes": None, "studies.one.sample": sample}).campaign
     cases, values = drawn(campaign)
     assert [slope for _, slope, _ in cases] == values["rms_slope"].tolist()
-    assert {surface for surface, _, _ in cases} == {"rough"} and len(run_cases(campaign)) == 8
+    assert {surface for surface, _, _ in cases} == {"rough"} and len(campaign.all_runs) == 8
 
 
 def test_beside_levels_the_sample_is_a_study_of_its_own(load):
     changes = ONE | {"studies.one.seeds": None, "surfaces.rough.grid": 96}
     changes |= {"studies.one.levels": {"asperities": "1..4", "coarse": "1..3", "fine": "1..2"}}
     campaign = load(changes).campaign
-    runs = run_cases(campaign)
+    runs = campaign.all_runs
     own = [run for run in runs if run.study == "one"]
     assert {(run.surface, run.material) for run in own} == {("rough", "soft")} and len(own) == 6
     inputs = [run for run in runs if run.study == inputs_study("one")]
@@ -316,10 +316,10 @@ def test_beside_boundary_elements_targets_may_lie_beyond_asperities(load):
 
 def test_other_models_have_a_folder_of_their_own(load):
     campaign = load(BOTH).campaign
-    paths = [case.path for case in run_cases(campaign)]
+    paths = [case.path for case in campaign.all_runs]
     assert paths[0] == "one/rough/seed1/slope0.2/soft" and paths[4] == "one/rough/seed1/slope0.2/boundary_elements/soft"
     assert list(campaign_files(campaign).runs)[-1] == "runs/one/rough/seed2/slope1/boundary_elements/soft.nc"
-    assert len({run_sha256(campaign, case) for case in run_cases(campaign)}) == 8
+    assert len({run_sha256(campaign, case) for case in campaign.all_runs}) == 8
 
 
 def test_boundary_elements_are_planned_as_a_part_of_their_own_at_their_own_cost(load, tmp_path):
@@ -328,7 +328,7 @@ def test_boundary_elements_are_planned_as_a_part_of_their_own_at_their_own_cost(
     assert [item.group for item in runs] == 4 * ["study one"] + 4 * ["study one, boundary elements"]
     quick, slow = runs[:4], runs[4:]
     assert min(item.cost.seconds for item in slow) > 2 * max(item.cost.seconds for item in quick)
-    first, *_, last = run_cases(campaign)
-    assert run_memory(campaign, last) > run_memory(campaign, first)
-    assert run_memory(campaign, last) * 1e6 > slow[0].cost.memory
+    first, *_, last = campaign.all_runs
+    quick_batch, *_, slow_batch = run_batches(campaign, campaign_files(campaign).runs)
+    assert slow_batch.memory > quick_batch.memory and slow_batch.memory * 1e6 > slow[0].cost.memory
     assert run_minutes(campaign, last) > run_minutes(campaign, first)

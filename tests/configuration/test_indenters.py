@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from icha.configuration.cases import run_cases, run_settings, surface_cases, surface_settings
+from icha.configuration.cases import run_settings, surface_cases, surface_settings
 from icha.surfaces.shapes import Cone, CylinderPunch, FlatPunch, Paraboloid, Sphere, Wave
 
 BALL = {"kind": "smooth", "side": "200 um", "grid": 64, "shape": {"sphere": {"radius": "1 mm"}}}
@@ -13,7 +13,7 @@ BY_CELLS = {"studies.one.models": ["boundary_elements"]}
 
 
 def paths(campaign):
-    return [case.path for case in run_cases(campaign)]
+    return [case.path for case in campaign.all_runs]
 
 
 def test_a_smooth_surface_has_neither_seeds_nor_slopes(load):
@@ -56,7 +56,7 @@ def test_defaults_are_not_among_the_settings_on_which_checksums_depend(load):
     plain, written = load().campaign, load({"surfaces.rough.boundary": "periodic"}).campaign
     assert surface_settings(plain, "rough") == surface_settings(written, "rough")
     assert not {"boundary", "shape"} & set(surface_settings(plain, "rough"))
-    material = run_settings(plain, run_cases(plain)[0])["material"]
+    material = run_settings(plain, plain.all_runs[0])["material"]
     assert not {"thickness", "poisson_ratio"} & set(material)
     assert surface_settings(load({"surfaces.rough.boundary": "free"}).campaign, "rough")["boundary"] == "free"
 
@@ -64,7 +64,7 @@ def test_defaults_are_not_among_the_settings_on_which_checksums_depend(load):
 def test_the_thickness_of_a_layer_is_varied(load):
     changes = BY_CELLS | {"materials.soft.poisson_ratio": 0.5, "studies.one.vary": {"thickness": ["1 mm", "2 mm"]}}
     campaign = load(changes).campaign
-    layers = {case.material: campaign.materials[case.material].thickness for case in run_cases(campaign)}
+    layers = {case.material: campaign.materials[case.material].thickness for case in campaign.all_runs}
     assert sorted(layers.values()) == [1e-3, 2e-3]
 
 

@@ -5,7 +5,6 @@ import re
 import pytest
 from demo_configuration import measured_surface
 
-from icha.configuration.cases import run_cases
 from icha.configuration.errors import ConfigurationError
 
 UNUSUAL = {
@@ -81,7 +80,7 @@ def test_on_sticky_surfaces_boundary_elements_alone_reach_an_accuracy(load, refu
     configuration = load(sticky | {"studies.one.accuracy": "5 %"})
     study = configuration.campaign.studies["one"]
     assert study.levels.asperities is None and len(study.levels.coarse) == 6 and len(study.levels.fine) == 4
-    assert {case.model for case in run_cases(configuration.campaign)} == {"boundary_elements"}
+    assert {case.model for case in configuration.campaign.all_runs} == {"boundary_elements"}
     (note,) = (each for each in configuration.warnings if "studies.one.accuracy" in each)
     assert "U_full/dgamma" in note and "boundary elements alone give the estimate" in note
     levels = {"asperities": "1..8", "coarse": "1..6", "fine": "1..4"}

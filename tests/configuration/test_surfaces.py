@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from demo_configuration import file_surface, measured_surface
 
-from icha.configuration.cases import run_cases, surface_cases, surface_settings
+from icha.configuration.cases import surface_cases, surface_settings
 from icha.configuration.errors import ConfigurationError
 from icha.configuration.surfaces import MeasuredSurface
 from icha.datasets.labels import number_label
@@ -19,7 +19,7 @@ def test_the_slope_that_a_topography_has(load, tmp_path):
     heights = amplitude * np.sin(2 * np.pi / period * x) * np.ones((size, 1))
     np.save(tmp_path / "own.npy", heights * 1e6)
     campaign = load({"surfaces.rough": file_surface("own.npy"), "studies.one.rms_slopes": "measured"}).campaign
-    (case,) = run_cases(campaign)
+    (case,) = campaign.all_runs
     assert case.rms_slope == pytest.approx(2 * np.pi / period * amplitude / np.sqrt(2), rel=1e-5)
     assert case.path == f"one/rough/seed0/slope{number_label(case.rms_slope)}/soft"
 
@@ -63,7 +63,7 @@ def test_surfaces_with_a_tabulated_spectrum_have_seeds_and_the_slope_of_their_ta
     changes = {"surfaces.rough": section, "studies.one.rms_slopes": "measured"}
     campaign = load(changes).campaign
     assert surface_cases(campaign) == [("rough", 1), ("rough", 2)]
-    (slope,) = {case.rms_slope for case in run_cases(campaign)}
+    (slope,) = {case.rms_slope for case in campaign.all_runs}
     assert slope == pytest.approx(0.3, rel=5e-3)
     assert surface_settings(campaign, "rough") == {
         "kind": "spectrum",

@@ -22,7 +22,6 @@ from sampled_cases import sampled
 
 import icha
 from icha.configuration.campaign import Campaign
-from icha.configuration.cases import run_cases
 from icha.configuration.load import load_configuration
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import read_campaign, write_dataset
@@ -120,7 +119,7 @@ def loaded(folder, campaign):
 def test_every_configuration_is_a_valid_one(page, folder):
     for line, campaign in campaigns(page):
         try:
-            assert run_cases(loaded(folder, campaign))
+            assert loaded(folder, campaign).all_runs
         except ValueError as error:
             pytest.fail(f"{page.name}, block at line {line}: {error}")
 
@@ -135,12 +134,12 @@ def test_settings_of_a_cluster_are_those_of_the_profile():
 
 def test_studies_have_the_runs_that_the_page_counts(folder):
     *_, (_, campaign) = campaigns(DOCS / "howto/vary.md")
-    counts = Counter(case.study for case in run_cases(loaded(folder, campaign)))
+    counts = Counter(case.study for case in loaded(folder, campaign).all_runs)
     counted = {"roughness": 18, "energy": 4, "along": 3, "chosen": 6, "short": 2, "light": 1}
     assert {study: counts[study] for study in counted} == counted
     text = (DOCS / "howto/vary.md").read_text(encoding="utf-8")
     named = set(re.findall(r"`((?:milled|weak)-[^`]*)`", text))
-    made = {name for case in run_cases(loaded(folder, campaign)) for name in (case.surface, case.material)}
+    made = {name for case in loaded(folder, campaign).all_runs for name in (case.surface, case.material)}
     assert named and named <= made
 
 
@@ -163,7 +162,7 @@ def frozen(settings):
 def write_results(folder, campaign):
     """The dataset of a campaign, of small surfaces."""
     runs = []
-    for case in run_cases(campaign):
+    for case in campaign.all_runs:
         path = campaign.studies[case.study].path_settings()
         material = campaign.materials[case.material].model_dump(exclude_none=True)
         runs.append((case, small_run(case, (frozen(path), frozen(material)))))

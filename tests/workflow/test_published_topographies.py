@@ -8,7 +8,7 @@ import pytest
 from conftest import REPOSITORY
 
 from icha.asperity.material import Material
-from icha.configuration.cases import run_cases, run_settings
+from icha.configuration.cases import run_settings
 from icha.configuration.load import load_configuration
 from icha.path.targets import Path
 from icha.simulation import simulate
@@ -40,7 +40,7 @@ def test_every_file_gives_contact_with_both_models(name):
     """More load gives more contact area; both models agree within a factor of two."""
     surface = prepared_topography(SURFACES[name].path, SURFACES[name].preparation).surface
     areas = {}
-    for case in (case for case in run_cases(CAMPAIGN) if case.surface == name):
+    for case in (case for case in CAMPAIGN.all_runs if case.surface == name):
         settings = run_settings(CAMPAIGN, case)
         scaled = surface.scaled_to_rms_slope(case.rms_slope)
         run = simulate(scaled, Material(**settings["material"]), Path(**settings["path"]), model=case.model)

@@ -8,7 +8,7 @@ from demo_configuration import GOOD
 
 from icha.analysis.common_loads import compare_runs
 from icha.asperity.material import Material
-from icha.configuration.cases import run_cases, run_settings, surface_settings
+from icha.configuration.cases import run_settings, surface_settings
 from icha.configuration.load import load_configuration
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import RunLabels
@@ -53,8 +53,8 @@ def runs(tmp_path, monkeypatch):
         (tmp_path / "campaign.yaml").write_text(yaml.safe_dump(content))
         campaign = load_configuration(tmp_path / "campaign.yaml").campaign
         table = str(tmp_path / "table.txt")
-        heights = {"height_map": table, "sha256": campaign.topography("rough").sha256} if kind == "spectrum" else {}
-        for case in run_cases(campaign):
+        heights = {"height_map": table, "sha256": campaign.topographies["rough"].sha256} if kind == "spectrum" else {}
+        for case in campaign.all_runs:
             file = tmp_path / f"seed{case.seed}.nc"
             settings = surface_settings(campaign, "rough")
             make_surface(file, name="rough", seed=case.seed, settings=settings, attributes={}, **heights)

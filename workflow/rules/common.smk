@@ -56,7 +56,7 @@ def attributes_of(path):
 def surface_arguments(path):
     """Return the arguments of the task that makes a surface."""
     name, seed = FILES.surfaces[path]
-    section, topography = CAMPAIGN.surfaces[name], CAMPAIGN.topography(name)
+    section, topography = CAMPAIGN.surfaces[name], CAMPAIGN.topographies.get(name)
     return {
         "name": name,
         "seed": seed,

@@ -6,11 +6,13 @@ from icha.configuration.figures import drawing
 from icha.datasets.results import FIGURE, FIGURE_ENDINGS, ResultFiles
 from icha.figures.registry import module_name
 from icha.planning.batches import figure_batches
-from icha.planning.requirements import figure_memory
+from icha.planning.requirements import largest_grid
 from icha.support.scripts import modules_of
 
 FIGURES = CAMPAIGN.figures.by_name()
-# Arguments of `icha.figures.registry.draw_figure` for each figure, without the paths of its files.
+# Nodes of the topography that a figure holds in memory; arguments of `icha.figures.registry.draw_figure` for each figure,
+# without the paths of its files.
+NODES = {name: each.holds_topography * largest_grid(CAMPAIGN) ** 2 for name, each in FIGURES.items()}
 DRAWINGS = {name: drawing(CAMPAIGN, name, ResultFiles(CAMPAIGN.name, RESULTS)) for name in FIGURES}
 
 
@@ -36,7 +38,7 @@ def given_files(name):
     return [*inputs.get("tables", ()), *scripts, *(file for script in scripts for file in modules_of(script))]
 
 
-for batch in figure_batches(FIGURES):
+for batch in figure_batches(NODES):
 
     rule:
         name:
@@ -53,7 +55,7 @@ for batch in figure_batches(FIGURES):
         conda:
             "../envs/icha.yaml"
         resources:
-            mem_mb=max(figure_memory(CAMPAIGN, holds_topography=FIGURES[name].holds_topography) for name in batch.files),
+            mem_mb=batch.memory,
             runtime=10,
         params:
             figures=as_it_is(LongList(DRAWINGS[name] for name in batch.files)),

@@ -3,24 +3,24 @@
 
 from itertools import chain
 
-from icha.planning.requirements import run_memory, run_minutes, run_threads, surface_memory, surface_threads
+from icha.planning.requirements import run_minutes, run_threads, surface_threads
 
 
 def surface_rules():
-    """Yield name of the rule, folder, batch, inputs, function for arguments, cores, memory and time limit."""
+    """Yield name of the rule, folder, batch, inputs, function for arguments, cores and time limit."""
     for batch in surface_batches(CAMPAIGN, FILES.surfaces):
         names = dict.fromkeys(FILES.surfaces[path][0] for path in batch.files)
         # Files of the user are compared by content, not by time, because the stamp contains their checksums.
         files = ancient([CAMPAIGN.surfaces[name].path for name in names if CAMPAIGN.surfaces[name].from_file])
-        needs = [max(need(CAMPAIGN, name) for name in names) for need in (surface_threads, surface_memory)]
-        yield f"make_{batch.name}", "surfaces", batch, files, surface_arguments, *needs, 30
+        cores = max(surface_threads(CAMPAIGN, name) for name in names)
+        yield f"make_{batch.name}", "surfaces", batch, files, surface_arguments, cores, 30
 
 
 def theory_rules():
     """Yield the same for batches of theories."""
     for batch in theory_batches(FILES.theories):
         surfaces = surfaces_for({path: FIRST_SURFACES[FILES.theories[path]] for path in batch.files})
-        yield f"compute_{batch.name}", "references", batch, surfaces, theory_arguments, 1, 600, 10
+        yield f"compute_{batch.name}", "references", batch, surfaces, theory_arguments, 1, 10
 
 
 def run_rules():
@@ -28,13 +28,11 @@ def run_rules():
     for batch in run_batches(CAMPAIGN, FILES.runs):
         cases = {FILES.runs[path]._replace(seed=0) for path in batch.files}
         surfaces = surfaces_for({path: surface_of(FILES.runs[path]) for path in batch.files})
-        needs = [max(need(CAMPAIGN, case) for case in cases) for need in (run_threads, run_memory, run_minutes)]
+        needs = [max(need(CAMPAIGN, case) for case in cases) for need in (run_threads, run_minutes)]
         yield f"run_{batch.name}", "runs", batch, surfaces, run_arguments, *needs
 
 
-for name, folder, batch, inputs, arguments, cores, memory, minutes in chain(
-    surface_rules(), theory_rules(), run_rules()
-):
+for name, folder, batch, inputs, arguments, cores, minutes in chain(surface_rules(), theory_rules(), run_rules()):
 
     rule:
         name:
@@ -54,7 +52,7 @@ for name, folder, batch, inputs, arguments, cores, memory, minutes in chain(
             "../envs/icha.yaml"
         threads: cores
         resources:
-            mem_mb=memory,
+            mem_mb=batch.memory,
             runtime=minutes,
         params:
             files=as_it_is(LongList(map(arguments, batch.files))),
