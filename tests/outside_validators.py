@@ -16,6 +16,13 @@ REPOSITORY = Path(__file__).parents[1]
 PYTHON = REPOSITORY / ".venv-validators/bin/python"
 
 
+def lock(**versions):
+    """A lock file with ICHA and with packages of these versions."""
+    package = '[[package]]\nname = "{}"\nversion = "{}"\nsource = {{ registry = "https://pypi.org/simple" }}\n'
+    own = 'version = 1\n[[package]]\nname = "icha"\nsource = { editable = "." }\n'
+    return own + "".join(package.format(*each) for each in versions.items())
+
+
 def sealed(folder):
     """A folder with the checksums of all its files, as a deposit has them."""
     sums = folder / "SHA256SUMS"

@@ -46,14 +46,6 @@ def run(request):
     return run_of(rough(), material, snapshots=[("reduced_pressure", 5e-3), ("area_fraction", 0.06)])
 
 
-def test_the_dataset_has_the_documented_format(run):
-    assert problems_with_file(RUN, run) == []
-    for name in ("title", "summary", "Conventions", "source", "campaign", "study", "config_sha256", "license"):
-        assert name in run.attrs
-    assert set(run.branch.values) == {"loading"}
-    assert np.all(run.converged == 1)
-
-
 @pytest.mark.parametrize("model", ["asperities", "boundary_elements"])
 def test_a_pit_deeper_than_the_bins_ends_no_run(model):
     """A pit of 40 rms heights, as lost points and holes of measured surfaces are."""

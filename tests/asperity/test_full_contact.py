@@ -56,26 +56,19 @@ def test_the_ratio_of_a_sticky_silicone_is_known():
     assert full_contact_energy_ratio(energy, 2.667e6, 0.0) == math.inf
 
 
-def pressed(energy, model="asperities", **path):
+def pressed(energy, **path):
     surface = icha.SelfAffineSpectrum(100e-6, 40e-6, 14.3e-6, 0.8).realise(32, 1)
     material = icha.Material(0.3e6, energy, 8e-9)
     try:
-        return icha.simulate(surface, material, icha.Path(**path), model=model)
+        return icha.simulate(surface, material, icha.Path(**path))
     except icha.ConvergenceError as error:
         return error.dataset
 
 
-def test_runs_say_where_asperities_are_not_applicable():
-    sticky = pressed(0.5, reduced_pressures=[1e-2])
+def test_an_infinite_ratio_is_a_value_of_every_file(tmp_path):
+    sticky, run = (pressed(energy, reduced_pressures=[1e-2]) for energy in (0.5, 0.0))
     assert float(sticky["full_contact_energy_ratio"]) == pytest.approx(0.698, abs=1e-3)
     assert "more than 0.014: adhesion unites neighbouring spots (U_full" in sticky.attrs["applicability"]
-    assert pressed(0.5, "boundary_elements", reduced_pressures=[1e-2]).attrs["applicability"] == ""
-    wide = pressed(0.0, mean_separations=[0.5e-6])
-    assert wide.attrs["applicability"].startswith("asperity model not applicable: mean gap of 0.0969 rms heights")
-
-
-def test_an_infinite_ratio_is_a_value_of_every_file(tmp_path):
-    run = pressed(0.0, reduced_pressures=[1e-2])
     assert np.isposinf(run["full_contact_energy_ratio"]) and run.attrs["applicability"] == ""
     write_dataset(run, tmp_path / "run.nc")
     back = read_run(tmp_path / "run.nc")

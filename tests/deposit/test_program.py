@@ -8,6 +8,7 @@ import subprocess
 
 import pytest
 from conftest import REPOSITORY, copy_project
+from outside_validators import lock
 
 import icha
 from icha.deposit.program import program_source, refuse_other_environment, version_differences
@@ -75,20 +76,11 @@ def test_the_revision_is_the_commit_or_a_checksum_of_the_files(clone, monkeypatc
     assert checksum() == changed
 
 
-def write_lock(folder, **versions):
-    packages = (
-        f'[[package]]\nname = "{name}"\nversion = "{version}"\nsource = {{ registry = "https://pypi.org/simple" }}\n'
-        for name, version in versions.items()
-    )
-    text = "".join(['version = 1\n[[package]]\nname = "icha"\nsource = { editable = "." }\n', *packages])
-    (folder / "uv.lock").write_text(text)
-    return text
-
-
 def test_another_environment_than_the_locked_one_is_refused(tmp_path):
     numpy = importlib.metadata.version("numpy")
-    assert version_differences(write_lock(tmp_path, NumPy=numpy, nobody="1")) == {}
+    (tmp_path / "uv.lock").write_text(lock(NumPy=numpy, nobody="1"))
     refuse_other_environment(tmp_path)
-    assert version_differences(write_lock(tmp_path, NumPy="0.1")) == {"numpy": f"{numpy} is installed, 0.1 is locked"}
+    (tmp_path / "uv.lock").write_text(lock(NumPy="0.1"))
+    assert version_differences(lock(NumPy="0.1")) == {"numpy": f"{numpy} is installed, 0.1 is locked"}
     with pytest.raises(ValueError, match=re.compile("make environment.*numpy: ", re.DOTALL)):
         refuse_other_environment(tmp_path)

@@ -9,7 +9,7 @@ import netCDF4
 import numpy as np
 import pytest
 import typer
-from outside_validators import problems_with
+from outside_validators import lock, problems_with
 from typer.testing import CliRunner
 
 from icha.cli import app, deposits
@@ -34,11 +34,6 @@ studies:
     targets: {{reduced_pressures: [1.0e-3]}}
 """
 LEAVES_A_MARK = "import pathlib; pathlib.Path({mark!r}).touch()\n"
-
-
-def lock(numpy):
-    """A lock file with one package."""
-    return f'[[package]]\nname = "numpy"\nversion = "{numpy}"\nsource = {{ registry = "https://pypi.org/simple" }}\n'
 
 
 def write_run(path, steps=3, factor=1.0, size=1, **attributes):
@@ -66,7 +61,7 @@ def deposit(pack, tmp_path):
         "surfaces/plate/seed0.nc": (tmp_path / "soft.nc").read_bytes(),
         "verdict.txt": "passed",
         "source/pyproject.toml": f'[project]\nversion = "{version("icha")}"\n',
-        "source/uv.lock": lock(version("numpy")),
+        "source/uv.lock": lock(numpy=version("numpy")),
         ".zenodo.json": json.dumps({"title": "A \x1b[2J title", "creators": [{"name": "Carberry, Josiah"}]}),
     }
 
@@ -172,7 +167,7 @@ def test_a_folder_continues_its_own_rerun_only(deposit, reproduce, computed, tmp
 
 
 def test_other_versions_of_packages_are_named(deposit, reproduce, computed):
-    status, output = reproduce(deposit(**{"source/uv.lock": lock("0.1")}))
+    status, output = reproduce(deposit(**{"source/uv.lock": lock(numpy="0.1")}))
     assert status == 0 and len(computed) == 1
     assert re.search(rf"other versions of packages.*\s+numpy: {version('numpy')} is installed, 0.1 is", output), output
 

@@ -33,23 +33,10 @@ FILES = {
 SENT = {f"{NAME}.zip", "README.md", "ro-crate-metadata.json"}
 
 
-def make_deposit(folder, **metadata):
-    """A deposit, as a folder and a zip, with just what an upload looks at."""
-    files = FILES | {".zenodo.json": json.dumps(METADATA | metadata).encode()}
-    files["SHA256SUMS"] = "".join(
-        f"{hashlib.sha256(content).hexdigest()}  {name}\n" for name, content in sorted(files.items())
-    ).encode()
-    with zipfile.ZipFile(folder / f"{NAME}.zip", "w") as archive:
-        for name, content in sorted(files.items()):
-            (folder / NAME / name).parent.mkdir(parents=True, exist_ok=True)
-            (folder / NAME / name).write_bytes(content)
-            archive.writestr(zipfile.ZipInfo(f"{NAME}/{name}"), content)
-    return folder / f"{NAME}.zip"
-
-
 @pytest.fixture
-def deposit(tmp_path):
-    return make_deposit(tmp_path)
+def deposit(pack):
+    """The zip of a deposit, beside its folder, with just what an upload looks at."""
+    return pack(FILES | {".zenodo.json": json.dumps(METADATA)}, NAME).with_name(f"{NAME}.zip")
 
 
 def upload(*arguments, token=TOKEN):
@@ -143,7 +130,7 @@ def test_nothing_is_sent_without_consent(server, deposit, monkeypatch):
     assert upload(deposit, "--url", server.address)[0] == 1 and server.requests == []
 
 
-def test_what_cannot_be_sent_is_refused_before_anything_is_asked(server, deposit, tmp_path):
+def test_what_cannot_be_sent_is_refused_before_anything_is_asked(server, deposit, pack, tmp_path):
     def refused(*arguments, **how):
         status, output = upload(*arguments, "--yes", **how)
         assert status == 2, output
@@ -155,8 +142,8 @@ def test_what_cannot_be_sent_is_refused_before_anything_is_asked(server, deposit
     assert "no such file" in refused(tmp_path / "none.zip", *url)
     refused(deposit, "--draft", "mine", *url)
     assert "with http" in refused(deposit, "--url", "http://zenodo.org")
-    (tmp_path / "reserved").mkdir()
-    reserved = make_deposit(tmp_path / "reserved", doi="10.5281/zenodo.5")
+    metadata = METADATA | {"doi": "10.5281/zenodo.5"}
+    reserved = pack(FILES | {".zenodo.json": json.dumps(metadata)}, "reserved").with_name("reserved.zip")
     assert "use --draft 5" in refused(reserved, *url)
     assert "use --draft 5" in refused(reserved, "--draft", "77", *url)
     with zipfile.ZipFile(deposit, "a") as archive:

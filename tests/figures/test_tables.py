@@ -1,4 +1,4 @@
-"""The table beside each figure has the numbers of the runs, with their labels."""
+"""All figures can be drawn; the table beside each has the numbers of the runs, with their labels."""
 
 import io
 
@@ -9,12 +9,14 @@ import small_campaign as small
 from xarray import DataTree
 
 import icha
+from icha.configuration.figures import Figures
 from icha.datasets.campaign import find_snapshot
 from icha.datasets.files import write_dataset
+from icha.datasets.results import figure_number
 from icha.datasets.table import as_csv
 from icha.figures import against_load, at_one_load, contact_maps, errors
 from icha.figures.drawn import table_of
-from icha.figures.registry import draw_figure
+from icha.figures.registry import draw_figure, drawing_function
 from icha.figures.select import path_steps
 from icha.references.theories import reference_dataset
 from icha.surfaces.moments import spectral_moments
@@ -80,6 +82,14 @@ def test_spots_are_listed_once():
     data = table(contact_maps.spots_by_slope(small.tree(), study="slopes", material="soft"))
     shown = data[(data.panel == "a") & (data.rms_slope == 0.2)]
     assert len(shown) == count and shown.radius.gt(0).all() and shown.x_quantity.str.fullmatch("x .µm.").all()
+
+
+def test_figures_are_in_the_order_of_their_numbers_and_can_be_drawn():
+    names = list(Figures.model_fields)
+    numbers = [figure_number(name) for name in names]
+    assert numbers == sorted(set(numbers)) and len(numbers) == 21
+    for name in names:
+        assert callable(drawing_function(name))
 
 
 def test_a_figure_without_data_has_an_empty_table(tmp_path):

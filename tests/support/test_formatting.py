@@ -12,41 +12,41 @@ from icha.support import formatting, rules, values
 from icha.support.units import conversion_factor
 from icha.support.values import to_number, to_si
 
-
-def test_sizes_have_three_digits():
-    sizes = (0, 999, 1e3, 70_240, 999_700, 15_234_567, 1.5e9, 2e12)
-    assert [*map(formatting.size, sizes)] == [
-        *("0 B", "999 B", "1 kB", "70.2 kB", "1000 kB", "15.2 MB", "1.5 GB", "2 TB"),
-    ]
-
-
-def test_durations_have_two_digits():
-    durations = (0.04, 9.96, 59, 119, 300, 7000, 7200, 99.7 * 3600, 450_000, 1e7)
-    assert [*map(formatting.duration, durations)] == [
-        *("0.04 s", "10 s", "59 s", "2 min", "5 min", "1.9 h", "2 h", "100 h", "5.2 days", "116 days"),
-    ]
+FORMATTED = {
+    formatting.size: "0 B, 999 B, 1 kB, 70.2 kB, 1000 kB, 15.2 MB, 1.5 GB, 2 TB",
+    formatting.duration: "0.04 s, 10 s, 59 s, 2 min, 5 min, 1.9 h, 2 h, 100 h, 5.2 days, 116 days",
+    formatting.length: "0 m, 2.5 um, -1 nm, 100 mm, 0.003 pm, 20 m",
+}
+NUMBERS = {
+    formatting.size: (0, 999, 1e3, 70_240, 999_700, 15_234_567, 1.5e9, 2e12),
+    formatting.duration: (0.04, 9.96, 59, 119, 300, 7000, 7200, 99.7 * 3600, 450_000, 1e7),
+    formatting.length: (0.0, 2.5e-6, -1e-9, 0.1, 3e-15, 20.0),
+}
 
 
-def test_lengths_have_the_units_of_configurations():
-    lengths = (0.0, 2.5e-6, -1e-9, 0.1, 3e-15, 20.0)
-    assert [*map(formatting.length, lengths)] == ["0 m", "2.5 um", "-1 nm", "100 mm", "0.003 pm", "20 m"]
+@pytest.mark.parametrize("write", FORMATTED)
+def test_numbers_have_few_digits_and_a_unit_that_fits(write):
+    assert ", ".join(map(write, NUMBERS[write])) == FORMATTED[write]
 
 
-def test_quantities_are_exact_si_values():
-    assert to_si("100 um", "m") == 1e-4
-    assert to_si("100 µm", "m") == 1e-4
-    assert to_si("0.1 mm", "m") == 1e-4
-    assert to_si("25MPa", "Pa") == 25e6
-    assert to_si("1.0e6 Pa", "Pa") == 1e6
-    assert to_si("50 mJ/m^2", "J/m^2") == to_si("50 mN/m", "J/m^2") == 0.05
-    assert to_si("2.071 nm", "m") == 2.071e-9
+QUANTITIES = {
+    "Pa": {"25MPa": 25e6, "1.0e6 Pa": 1e6},
+    "J/m^2": dict.fromkeys(("50 mJ/m^2", "50 mN/m", "50 mJ/m²", "50 mJ·m⁻²", "50 mJ m^-2"), 0.05),
+    "m": {"100 um": 1e-4, "100 µm": 1e-4, "0.1 mm": 1e-4, "2.071 nm": 2.071e-9}
+    | dict.fromkeys(("3 Angstrom", "3 angstroms", "3 \u00c5", "3 \u212b"), 3e-10)
+    | dict.fromkeys(("3 \u00b5m", "3 \u03bcm", "3 micrometers", "3 Microns"), 3e-6)
+    | {"3 nanometre": 3e-9, "3 pm": 3e-12, "3 in": 0.0762, "3 inches": 0.0762, "3 mil": 7.62e-5, "3 thou": 7.62e-5},
+}
+
+
+@pytest.mark.parametrize("si_unit", QUANTITIES)
+def test_quantities_are_exact_si_values(si_unit):
+    assert {text: to_si(text, si_unit) for text in QUANTITIES[si_unit]} == QUANTITIES[si_unit]
 
 
 def test_numbers_that_yaml_reads_as_text_are_numbers():
     assert yaml.safe_load("1e-3") == "1e-3"
-    assert to_number("1e-3") == 1e-3
-    assert to_number("1.0e6") == 1e6
-    assert to_number(3) == 3.0
+    assert [*map(to_number, ("1e-3", "1.0e6", 3))] == [1e-3, 1e6, 3.0]
 
 
 OF_PINT = {
@@ -63,26 +63,6 @@ def test_units_have_the_factors_of_pint():
     for si_unit, unit in ((each, unit) for each, units in OF_PINT.items() for unit in units):
         expected = registry.Quantity(Decimal(1), unit).to(si_unit).magnitude
         assert float(conversion_factor(unit, si_unit)) == pytest.approx(float(expected), rel=1e-14), unit
-
-
-def test_signs_of_products_and_powers():
-    assert {conversion_factor(unit, "J/m^2") for unit in ("mJ/m²", "mJ·m⁻²", "mN/m", "mJ m^-2")} == {Decimal("1e-3")}
-
-
-LENGTHS = {
-    "Angstrom angstroms \u00c5 \u212b": "1e-10",
-    "\u00b5m \u03bcm micrometers Microns": "1e-6",
-    "nanometre": "1e-9",
-    "pm": "1e-12",
-    "in inches": "0.0254",
-    "mil thou": "2.54e-5",
-}
-
-
-@pytest.mark.parametrize(("units", "metres"), LENGTHS.items())
-def test_lengths_of_scans(units, metres):
-    for unit in units.split():
-        assert to_si(f"3 {unit}", "m") == float(3 * Decimal(metres))
 
 
 SLIPS = {"2 Mpa": "Pa", "50 J/m2": "J/m^2", "3 UM": "m", "3 Nm": "m", "3 px": "m", "3 Mm": "m", "3 m^2": "m"}

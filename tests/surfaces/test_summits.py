@@ -143,6 +143,28 @@ def test_every_summit_of_a_resolved_surface_is_supported():
         assert left_out <= most * sum(map(len, found))
 
 
+@pytest.mark.filterwarnings("ignore:grid")
+def test_surfaces_and_summits_have_the_same_bits_on_any_number_of_cores(monkeypatch):
+    """Odd and even grids of several blocks, the last of them not full."""
+    results = set()
+    for threads in ("1", "2", "5"):
+        monkeypatch.setenv("OMP_NUM_THREADS", threads)
+        bits = b""
+        for grid in (333, 600):
+            surface = SelfAffineSpectrum(PERIOD, 20e-6, PERIOD / 100, 0.8).realise(grid, 1)
+            found = find_summits(surface)
+            arrays = (
+                surface.heights,
+                surface.spectral_moments,
+                found.position,
+                found.height,
+                found.radius_of_curvature,
+            )
+            bits += b"".join(np.array(each).tobytes() for each in arrays)
+        results.add(bits)
+    assert len(results) == 1
+
+
 def stepped(surface):
     """The surface with one half of it raised by forty rms heights: edges of a plateau, where the spline overshoots."""
     heights = np.array(surface.heights)

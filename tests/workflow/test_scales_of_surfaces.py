@@ -2,14 +2,11 @@
 
 import numpy as np
 import pytest
-import yaml
 from conftest import REPOSITORY
-from demo_configuration import GOOD
 
 from icha.analysis.common_loads import compare_runs
 from icha.asperity.material import Material
 from icha.configuration.cases import run_settings, surface_settings
-from icha.configuration.load import load_configuration
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import RunLabels
 from icha.datasets.surface_file import read_scaled_surface
@@ -28,7 +25,7 @@ PROMISES = {
 
 
 @pytest.fixture
-def runs(tmp_path, monkeypatch):
+def runs(load, tmp_path, monkeypatch):
     """Return the promised values of the runs of a study, and their surfaces as the jobs make them."""
     monkeypatch.syspath_prepend(str(REPOSITORY / "workflow/scripts"))
 
@@ -38,20 +35,10 @@ def runs(tmp_path, monkeypatch):
         SpectrumTable(q, spectrum.psd(q)).save(tmp_path / "table.txt")
         lengths = {name: value if name == "hurst" else f"{value} m" for name, value in LENGTHS.items()}
         section = lengths if kind == "self_affine" else {"path": "table.txt", "period": "100 um"}
-        content = yaml.safe_load(GOOD)
-        content["surfaces"]["rough"] = {
-            "kind": kind,
-            **section,
-            "grid": 80,
-            "amplitudes": amplitudes,
-            "boundary": boundary,
-        }
-        study = content["studies"]["one"]
-        del study["rms_slopes"]
-        content["studies"]["one"] = study | PROMISES[promise] | {"seeds": [1, 2, 3]}
-        content["materials"]["soft"]["surface_energy"] = "0 J/m^2"
-        (tmp_path / "campaign.yaml").write_text(yaml.safe_dump(content))
-        campaign = load_configuration(tmp_path / "campaign.yaml").campaign
+        ((key, values),) = PROMISES[promise].items()
+        rough = section | {"kind": kind, "grid": 80, "amplitudes": amplitudes, "boundary": boundary}
+        study = {"studies.one.rms_slopes": None, f"studies.one.{key}": values, "studies.one.seeds": [1, 2, 3]}
+        campaign = load({"surfaces.rough": rough, "materials.soft.surface_energy": "0 J/m^2"} | study).campaign
         table = str(tmp_path / "table.txt")
         heights = {"height_map": table, "sha256": campaign.topographies["rough"].sha256} if kind == "spectrum" else {}
         for case in campaign.all_runs:
