@@ -154,11 +154,6 @@ def test_fig5_draws_measurements_over_the_curves(tmp_path):
     np.testing.assert_allclose(shifted[0].get_xdata(), [2e-4, 2e-3, 4e-3])
 
 
-def test_values_that_the_campaign_lacks_are_named_with_those_it_has():
-    with pytest.raises(NothingToDraw, match="no complete run has material steel; complete runs have material soft"):
-        contact_maps.spots_by_slope(small.tree(), study="slopes", material="steel")
-
-
 def test_fig7_is_the_slope_of_fig2_whatever_the_rms_slope():
     # Without adhesion p* against u/h_rms is one curve for all slopes of a topography, and so is its derivative.
     one, other = (
@@ -168,14 +163,6 @@ def test_fig7_is_the_slope_of_fig2_whatever_the_rms_slope():
     common = sorted(set(one) & set(other))
     assert len(common) >= len(small.PRESSURES)
     np.testing.assert_allclose([one[p] for p in common], [other[p] for p in common], rtol=1e-6)
-
-
-def test_fig7_leaves_out_what_has_no_logarithm():
-    run = small.run().copy(deep=True)
-    run["contact_stiffness"].values[0] *= -1
-    run["reduced_pressure"].values[1] = -1e-4
-    p, stiffness = against_load.STIFFNESS.points(run)
-    assert len(p) == len(stiffness) == run.sizes["step"] - 2
 
 
 def test_fig8_density_and_counts_of_a_known_distribution():
@@ -274,7 +261,12 @@ def test_fig3_draws_persson_at_the_load_of_each_run():
     assert len({points["material"] for points in drawn}) == 2
 
 
-def test_steps_at_zero_load_are_not_on_logarithmic_axes():
+def test_steps_without_a_logarithm_are_not_on_logarithmic_axes():
+    run = small.run().copy(deep=True)
+    run["contact_stiffness"].values[0] *= -1
+    run["reduced_pressure"].values[1] = -1e-4
+    p, stiffness = against_load.STIFFNESS.points(run)
+    assert len(p) == len(stiffness) == run.sizes["step"] - 2
     run = small.run().copy(deep=True)
     run["step_target"][0], run["reduced_pressure"][0] = 0.0, 1e-13
     assert path_steps(run).sizes["step"] == path_steps(small.run()).sizes["step"] - 1
@@ -339,22 +331,23 @@ def test_fig10_shows_means_and_seeds_of_the_errors_in_per_cent():
     assert adhesive.get_markerfacecolor() != "white" and bare.get_markerfacecolor() == "white"
 
 
-def test_errors_of_runs_that_all_failed_are_nothing_to_draw():
-    empty = {
-        f"/{name}": node.to_dataset().map(lambda each: each * np.nan if each.dtype.kind == "f" else each)
-        for name, node in compared.errors().children.items()
-    }
-    with pytest.raises(NothingToDraw, match="study one: no run that was compared with boundary elements is complete"):
-        errors.distribution_error(compared.tree(), xr.DataTree.from_dict(empty), study="one")
-
-
-def test_only_complete_runs_are_drawn():
+def test_only_complete_runs_are_drawn(surface):
     runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"]
     ended = [(labels, run.assign_attrs(incomplete="no equilibrium at the third stop")) for labels, run in runs]
     tree = campaign_tree([ended[0], *runs[1:]])
     assert {labels for labels, _ in select_runs(tree, "slopes")} == {labels for labels, _ in runs[1:]}
     with pytest.raises(NothingToDraw, match="study slopes: no run is complete"):
         against_load.multi_slope(campaign_tree(ended), study="slopes")
+    with pytest.raises(NothingToDraw, match="slopes/rough/seed1/slope1/soft: this run is not complete"):
+        contact_maps.contact_map(tree, surface, run=ended[0][0])
+    with pytest.raises(NothingToDraw, match="no complete run has material steel; complete runs have material soft"):
+        contact_maps.spots_by_slope(small.tree(), study="slopes", material="steel")
+    empty = {
+        f"/{name}": node.to_dataset().map(lambda each: each * np.nan if each.dtype.kind == "f" else each)
+        for name, node in compared.errors().children.items()
+    }
+    with pytest.raises(NothingToDraw, match="study one: no run that was compared with boundary elements is complete"):
+        errors.distribution_error(compared.tree(), xr.DataTree.from_dict(empty), study="one")
 
 
 # --- ensembles --------------------------------------------------------------------------------------------------
@@ -462,14 +455,6 @@ def test_a_material_has_one_colour_and_a_model_one_marker_in_all_figures_of_a_ca
         assert drawn and {line.get_marker() for line in drawn} <= {"o", "+", "1", ".", "_", "None", None}
 
 
-def test_fig4_does_not_show_another_run_where_its_own_failed(surface):
-    runs = [(LABELS._replace(study="one", seed=seed), small.run(seed)) for seed in (1, 2)]
-    runs[0] = (runs[0][0], runs[0][1].assign_attrs(incomplete="no equilibrium"))
-    tree = campaign_tree(runs)
-    with pytest.raises(NothingToDraw, match="one/rough/seed1/slope1/soft: this run is not complete"):
-        contact_maps.contact_map(tree, surface, run=LABELS)
-
-
 def test_a_density_of_fewer_than_three_bins_is_not_drawn(monkeypatch):
     monkeypatch.setattr(at_one_load, "_FEWEST_BINS", 3)
     (alone,) = at_one_load.patch_sizes(small.tree(), study="single").axes
@@ -477,22 +462,21 @@ def test_a_density_of_fewer_than_three_bins_is_not_drawn(monkeypatch):
     assert "seed" not in alone.get_title(loc="right") and "A_0" in alone.get_title(loc="right")
 
 
-def caption_of_fig2(study, **data):
-    units = {"units": data.pop("units")} if "units" in data else {}
-    return caption_of(against_load.area_and_gap(**data, study=study, **units))
+def caption_of_fig2(tree, study):
+    return caption_of(against_load.area_and_gap(tree, study=study))
 
 
 def test_captions_state_only_what_the_figure_contains():
     tree = small.tree()
-    bare = caption_of_fig2("slopes", campaign=tree)
+    bare = caption_of_fig2(tree, "slopes")
     assert "Results are means" not in bare and "Thin dashed" not in bare and "Theories" not in bare
     assert "Boundary elements" not in bare
     assert "(a) Contact area over load against the reduced pressure. (b) Mean separation against" in bare
-    assert "Results are means over the seeds" in caption_of_fig2("single", campaign=tree)
-    both = caption_of_fig2("one", campaign=compared.tree_of_both())
+    assert "Results are means over the seeds" in caption_of_fig2(tree, "single")
+    both = caption_of_fig2(compared.tree_of_both(), "one")
     assert "Panels (c) and (d) show" in both
     assert "in the limit of a short range" in both and "range of attraction of the material" not in both
-    finite = caption_of_fig2("one", campaign=compared.tree_at_finite_range())
+    finite = caption_of_fig2(compared.tree_at_finite_range(), "one")
     assert "range of attraction of the material, which the grid resolves" in finite
 
 
@@ -517,7 +501,8 @@ def test_fig2_in_physical_units_has_pressures_and_gaps_with_units():
     references = reference_dataset(small.SPECTRUM, spectral_moments(small.surface()), {})
     left, right = against_load.area_and_gap(small.tree(), references, study="single", units="physical").axes
     assert left.get_xlabel() == label_of("nominal_pressure", "kPa") and right.get_ylabel() == label_of("mean_gap", "µm")
-    load, values = at_common([small.run(seed) for seed in (1, 2)])
+    stops = [path_steps(small.run(seed)) for seed in (1, 2)]
+    load, values = stops[0]["nominal_pressure"].values, np.array([each["mean_gap"].values for each in stops])
     (mean,) = (line for line in right.get_lines() if line.get_marker() == "o" and len(line.get_xdata()) == len(load))
     np.testing.assert_allclose(mean.get_xdata(), load * 1e-3, rtol=1e-6)
     np.testing.assert_allclose(mean.get_ydata(), values.mean(axis=0) * 1e6, rtol=1e-6)
@@ -527,9 +512,3 @@ def test_fig2_in_physical_units_has_pressures_and_gaps_with_units():
     np.testing.assert_allclose(theory.get_ydata(), expected, rtol=1e-6)
     several = against_load.area_and_gap(small.tree(), references, study="slopes", units="physical").axes[0]
     assert "Persson" not in [line.get_label() for line in several.get_lines()]
-
-
-def at_common(runs):
-    """Nominal pressures and mean gaps of runs at the targets that they share."""
-    stops = [path_steps(run) for run in runs]
-    return stops[0]["nominal_pressure"].values, np.array([each["mean_gap"].values for each in stops])

@@ -159,6 +159,8 @@ def test_captions_say_that_theories_of_flat_surfaces_do_not_hold_under_a_shape(m
     tree = tree_of(press(rms=1e-8, energy=0.0))
     words = caption_of(module(tree, study="press"))
     assert "They do not hold under a shape, so none is drawn" in words and "Persson" not in words
+    figure, studies = module(tree, study="press"), [tree["press"].to_dataset()]
+    assert "the units h_rms of gaps and h'rms of loads are not those of the" in units_of_shapes(figure, studies)
 
 
 def test_works_of_adhesion_of_a_smooth_sphere_are_one(campaign):
@@ -223,12 +225,6 @@ def test_measurements_of_indenters_are_drawn_in_the_units_of_the_figures(campaig
     np.testing.assert_allclose(points[0][0], [height * unit, 2.0])
 
 
-def test_captions_state_the_units_of_shapes():
-    campaign = tree_of(press(energy=0.0))
-    figure, studies = against_load.stiffness(campaign, study="press"), [campaign["press"].to_dataset()]
-    assert "the units h_rms of gaps and h'rms of loads are not those of the" in units_of_shapes(figure, studies)
-
-
 def test_maps_show_the_pressure_at_every_snapshot():
     run = press()
     fig = contact_maps.pressure_maps(tree_of(run), run, run=("press", "boundary_elements", "s0", 0, 0.1, "soft"))
@@ -247,6 +243,9 @@ def test_maps_show_the_pressure_at_every_snapshot():
 
 
 def test_reasons_for_an_empty_figure():
+    labels = [RunLabels("press", model, "s0", 0, 0.1, "soft") for model in ("asperities", "boundary_elements")]
+    (series,) = indenters.select_series(campaign_tree(zip(labels, (press(), press()), strict=True)), "press")
+    assert series.runs.labels.model == "boundary_elements"
     bare = tree_of(press(energy=0.0))
     indenters.force_indentation(bare, study="press")
     for module in FIGURES[1:]:
@@ -256,10 +255,3 @@ def test_reasons_for_an_empty_figure():
     assert len(lines(indenters.force_indentation(cone, study="press").axes[0])) == 3  # both legs, and zero force
     with pytest.raises(select.NothingToDraw, match="no sphere with adhesion"):
         indenters.jkr_plot(cone, study="press")
-
-
-def test_a_study_with_both_models_shows_boundary_elements():
-    labels = [RunLabels("press", model, "s0", 0, 0.1, "soft") for model in ("asperities", "boundary_elements")]
-    both = campaign_tree(zip(labels, (press(), press()), strict=True))
-    (series,) = indenters.select_series(both, "press")
-    assert series.runs.labels.model == "boundary_elements"

@@ -26,7 +26,7 @@ def table(figure):
     return pd.read_csv(io.StringIO(as_csv(table_of(figure))))
 
 
-def test_means_over_seeds_with_their_range():
+def test_means_over_seeds_have_their_range_and_single_runs_their_labels():
     data = table(against_load.area_and_gap(small.tree(), study="single"))
     ratios = data[data.panel == "a"]
     assert set(ratios.curve) == {"asperities"} and set(ratios.material) == {"soft"} and "seed" not in data
@@ -37,14 +37,15 @@ def test_means_over_seeds_with_their_range():
     np.testing.assert_allclose([ratios.low, ratios.high], [np.min(each, axis=0), np.max(each, axis=0)], rtol=1e-4)
     assert set(ratios.seeds) == {2} and set(ratios.x_quantity) == {"reduced pressure F/(E*h'rmsA0)"}
     assert set(data[data.panel == "b"].y_quantity) == {"mean separation ū/h_rms"}
-
-
-def test_single_runs_have_their_seed_and_slope():
+    # Single runs have their seed, slope and model.
     data = table(against_load.area_and_gap(small.tree(), study="slopes"))
     run = path_steps(small.run(rms_slope=0.2, material="hertz"))
     shown = data[(data.panel == "b") & (data.rms_slope == 0.2) & (data.material == "hertz")]
     np.testing.assert_allclose(shown.y, run["reduced_separation"].values, rtol=1e-9)
     assert set(shown.seed) == {1} and set(shown.model) == {"asperities"}
+    data = table(at_one_load.patch_sizes(compared.tree_of_both(), study="one"))
+    names = {("asperities", "asperities"), ("boundary elements", "boundary_elements")}
+    assert set(zip(data.curve, data.model, strict=True)) == names
 
 
 def test_points_that_are_drawn_apart_have_their_load():
@@ -55,14 +56,6 @@ def test_points_that_are_drawn_apart_have_their_load():
     areas = data[data.panel == "a"]
     means = 100 * error["one"]["area_error"].mean("seed").values.ravel()
     assert np.isclose(areas.y.values[:, None], means, rtol=1e-8).any(axis=1).all()
-
-
-def test_boundary_elements_are_named_as_such():
-    data = table(at_one_load.patch_sizes(compared.tree_of_both(), study="one"))
-    assert set(zip(data.curve, data.model, strict=True)) == {
-        ("asperities", "asperities"),
-        ("boundary elements", "boundary_elements"),
-    }
 
 
 def test_theories_of_several_materials_can_be_told_apart():
