@@ -3,28 +3,11 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 # Largest relative error of an identity between values of one dataset.
 IDENTITY_LIMIT = 1e-8
-
-# Values of a run that are not valid if the run fails a check: all values, or only those of the hysteresis loss.
-EVERYTHING, LOSS = "everything", "loss"
-
-
-class Definition(NamedTuple):
-    """Definition of a check.
-
-    Attributes
-    ----------
-    description : meaning of the value of the check.
-    invalidates : EVERYTHING or LOSS, the values of a run that fails the check that are not valid.
-    """
-
-    description: str
-    invalidates: str = EVERYTHING
 
 
 @dataclass(frozen=True)
@@ -39,7 +22,6 @@ class Check:
     passed : whether the value is finite and at most the limit.
     description : meaning of the value.
     subject : name of the run.
-    invalidates : values of a failed run that are not valid, as in `Definition`.
     """
 
     name: str
@@ -48,7 +30,6 @@ class Check:
     passed: bool
     description: str
     subject: str = ""
-    invalidates: str = EVERYTHING
 
 
 class RunArrays(dict[str, np.ndarray]):
@@ -59,11 +40,8 @@ class RunArrays(dict[str, np.ndarray]):
         self.sizes, self.attrs = sizes, attrs
 
 
-def compare_with_limit(
-    name: str, value: float, limit: float, description: str, subject: str, invalidates: str = EVERYTHING
-) -> Check:
+def compare_with_limit(name: str, value: float, limit: float, description: str, subject: str) -> Check:
     """Return the check that a value is finite and at most its limit."""
-    value = float(value)
+    value, limit = float(value), float(limit)
     finite = math.isfinite(value)
-    passed = bool(finite and value <= limit)
-    return Check(name, value if finite else -1.0, float(limit), passed, description, subject, invalidates)
+    return Check(name, value if finite else -1.0, limit, finite and value <= limit, description, subject)

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from icha.checks.findings import IDENTITY_LIMIT, LOSS, Definition
+from icha.checks.findings import IDENTITY_LIMIT
 from icha.contact.models import RESIDUAL_TOLERANCE, model_of
 from icha.datasets.quantities import LOSS_PARTS
 from icha.path.energy_balance import event_error, pressure_jump
@@ -23,9 +23,9 @@ CELL_CLOSURE_LIMIT = 1e-4
 # nearly conserves energy: without adhesion, loops close within 0.004 % (docs/hysteresis.md).
 UNION_LIMIT = 1e-3
 
-# Energies of a loop are differences of works. A run whose energies are wrong keeps its pull-off, areas and gaps, which
-# are those of equilibria.
-_ENERGIES = {
+# Meanings of the checks of energies, which are differences of works. A run whose energies are wrong keeps its pull-off,
+# areas and gaps, which are those of equilibria.
+OF_ENERGIES = {
     "loss adds up": "difference between the hysteresis loss and the sum of its parts, divided by the largest work",
     "loss is the work": "difference between the hysteresis loss and the work of the loop, divided by the largest work",
     "loop loses energy": "energy gained in the whole loop, divided by the largest work",
@@ -35,16 +35,14 @@ _ENERGIES = {
     "load jumps lose energy": "energy gained in jumps at constant load, divided by the largest work",
     "loop closes": "hysteresis loss divided by largest work; must be zero without adhesion and coalescence",
 }
-_STATES = {
+# Meanings of the other checks of a loop.
+OF_LOOPS = {
     "events": "number of events that are only in the counts of events or only in the list of events",
     "separated: spots": "number of spots left in contact at the end of unloading",
     "separated: pressure": "nominal pressure left at the end of unloading, in Pa",
     "pull-off pressure": "difference between the pull-off pressure and the largest tension of the last unloading, "
     "divided by the largest pressure of this unloading",
 }
-# Definitions of the checks by name.
-LOOP_CHECKS = {name: Definition(words) for name, words in _STATES.items()}
-LOOP_CHECKS |= {name: Definition(words, invalidates=LOSS) for name, words in _ENERGIES.items()}
 
 
 def check_loop(run) -> Iterator[tuple]:
