@@ -42,7 +42,6 @@ def file_attributes(
     summary: str,
     level: str,
     *,
-    programs: Iterable[str] = ("icha",),
     sources: Iterable[str] = (),
     references: str = "",
     keywords: Iterable[str] = (),
@@ -53,12 +52,11 @@ def file_attributes(
     ----------
     title, summary : content of the file, in one line and in full sentences.
     level : one of the processing levels of this module.
-    programs : names of the Python packages that computed the content; the installed versions are added.
-    sources : names and versions of the programs that computed the content. Default: the installed `programs`.
+    sources : names and versions of the programs that computed the content. Default: the installed ICHA.
     references : publications of the methods.
     keywords : further keywords, in addition to those of all files.
     """
-    source = "; ".join([*sources] or [f"{name} {version(name)}" for name in programs])
+    source = "; ".join(sources) or f"icha {version('icha')}"
     found = {
         "title": title,
         "summary": summary,

@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from icha.datasets.campaign import runs_of_status, variables_of_run
-from icha.datasets.labels import LABELS, place_of
+from icha.datasets.campaign import run_place, runs_of_status, variables_of_run
+from icha.datasets.labels import LABELS
 from icha.datasets.variables.campaign import COMPUTED_RUNS, STATUS_MEANINGS
 from icha.path.targets import BETWEEN
 
@@ -47,31 +47,26 @@ def tidy_table(campaign: xr.DataTree) -> pd.DataFrame:
 
 def _study_table(campaign, name):
     """Return the table of one study."""
-    study = campaign[name].to_dataset()
-    status = study["status"].transpose(*LABELS).values
-    frames = []
+    study, frames = campaign[name].to_dataset(), []
     for labels in runs_of_status(study, name, COMPUTED_RUNS):
         variables, _ = variables_of_run(campaign, labels)
         targets = np.flatnonzero(variables["step_kind"].values.astype(str) != BETWEEN)
-        place = place_of(study, {label: getattr(labels, label) for label in LABELS})
-        columns = {"study": name} | {label: getattr(labels, label) for label in LABELS}
+        place, columns = run_place(study, labels), labels._asdict()
         for varied, values in study.coords.items():
             if "varied" in values.attrs:
                 unit = values.attrs["units"]
                 columns[column_name(varied, unit)] = values.values[place[values.dims[0]]]
-        columns["status"] = STATUS_MEANINGS[int(status[tuple(place[label] for label in LABELS)])]
+        columns["status"] = STATUS_MEANINGS[int(study["status"].isel(place))]
         of_steps, of_run = {}, {}
         for key, variable in variables.items():
             if variable.dims not in (("step",), ()) or key in LABELS:
                 continue
             # The unit of a target depends on its kind.
             named = key if key == "step_target" else column_name(key, variable.attrs["units"])
-            if variable.dims:
-                of_steps[named] = variable.values[targets]
-            else:
+            if not variable.dims:
                 of_run[named] = variable.values.item()
-        if not len(targets):
-            of_steps = {named: [np.nan] for named in of_steps}
+            else:
+                of_steps[named] = variable.values[targets] if len(targets) else [np.nan]
         frames.append(pd.DataFrame(columns | of_steps | of_run, index=range(max(len(targets), 1))))
     return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame({"study": []})
 

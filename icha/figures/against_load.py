@@ -232,7 +232,6 @@ def _estimate(bare, adhesive):
 
 _AREA = Panel("relative_load", "contact_area_fraction")
 _RATIO, _RATIO_OF_SHAPE = Panel("reduced_pressure", "area_over_load"), Panel("relative_load", "area_over_relative_load")
-_SHAPED = "Relative loads take the place of reduced pressures, because a surface has a shape."
 
 
 @in_style
@@ -251,10 +250,7 @@ def multi_slope(
     Axes of relative loads show only measurements whose relative loads are known. The `contact_modulus` of a measurement
     is E*, Pa, if its loads are pressures in Pa, and None if they are reduced pressures p/(E* h'rms).
     """
-    shown = curves.study_curves(campaign, study, boundary_elements)
-    if not shown.looks.by_place:
-        # Open markers do not hide each other where curves coincide.
-        shown = curves.study_curves(campaign, study, boundary_elements, mfc="none")
+    shown = curves.study_curves(campaign, study, boundary_elements, open_markers=True)
     looks, shaped = shown.looks, has_shape(campaign[study].to_dataset())
     # If colours distinguish surfaces and slopes, every material has a row of panels.
     rows = [[material] for material in looks.materials] if looks.by_place else [looks.materials]
@@ -275,7 +271,6 @@ def multi_slope(
             ax.set_title(looks.material_name(materials[0]) if len(rows) > 1 else "", loc="right", fontsize=8)
             panel.label(ax, lowest=materials is rows[-1])
         curves.limit_ratios(row[1], values)
-    say(fig, _SHAPED if shaped else "")
     legend_below(fig, shown.handles)
     if measurements:
         named = "; ".join(f"{each['label']} ({each['citation']})" for each in measurements)

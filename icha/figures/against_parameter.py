@@ -17,6 +17,7 @@ from icha.contact.attraction import FINITE_RANGE, SHORT_RANGE
 from icha.datasets.campaign import find_snapshot
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import LOSS_PARTS, label_of
+from icha.figures import select
 from icha.figures.captions import attractions_of, grid_of_loops, range_of_attraction
 from icha.figures.curves import drop_rounding_errors, gap_name
 from icha.figures.drawn import Name, plot, record, say
@@ -30,18 +31,10 @@ from icha.figures.looks import (
     legend_below,
     model_handle,
 )
-from icha.figures.select import (
-    ContactRuns,
-    Line,
-    NothingToDraw,
-    group_by_contact,
-    has_shape,
-    select_detached_lines,
-    select_runs,
-    snapshot_label,
-)
 from icha.figures.style import GREY, ONE_COLUMN, TWO_COLUMNS, in_style, logarithmic_axes, new_panels
 from icha.support.formatting import choose_unit
+
+_NEEDED = "the figure needs a surface energy"
 
 # --- figure 9 ---
 
@@ -62,15 +55,15 @@ def tabor(campaign: xr.DataTree, *, study: str, kind: str | None = None, target:
 
     For smooth spheres that are pulled off, draw the pull-off force and the loss instead.
     """
-    runs = select_runs(campaign, study, ragged=False)
+    runs = select.select_runs(campaign, study, ragged=False)
     if all(float(run.get("pull_off_force_over_jkr", 0)) and run["short_wavelength"] == np.inf for _, run in runs):
         return _pull_off_of_spheres([run for _, run in runs])
-    groups = group_by_contact(campaign, runs)
-    shown = snapshot_label(groups[-1].first, find_snapshot(groups[-1].first, kind, target))
+    groups = select.group_by_contact(campaign, runs)
+    shown = select.snapshot_label(groups[-1].first, find_snapshot(groups[-1].first, kind, target))
     # Materials that differ only in the range of attraction form one line with the name of the first material.
     materials: dict[tuple, str] = {}
-    curves: dict[Line, list[ContactRuns]] = {}
-    bare: dict[Line, list[ContactRuns]] = {}
+    curves: dict[select.Line, list[select.ContactRuns]] = {}
+    bare: dict[select.Line, list[select.ContactRuns]] = {}
     for group in groups:
         states = {seed: state_of(run, find_snapshot(run, kind, target)) for seed, run in group.by_seed.items()}
         group = group._replace(by_seed=states)
@@ -81,7 +74,7 @@ def tabor(campaign: xr.DataTree, *, study: str, kind: str | None = None, target:
         elif not group.doubt:
             bare.setdefault(line, []).append(group)
     if not curves:
-        raise NothingToDraw(f"study {study}: no run with adhesion is complete; the figure needs a surface energy")
+        raise select.NothingToDraw(f"study {study}: no run with adhesion is complete; {_NEEDED}")
 
     # The name of a material has no range of attraction, because lines of different ranges are one line.
     looks = Looks(campaign, [study], curves, only_drawn=True)
@@ -184,8 +177,8 @@ _Y = "pull_off_pressure"
 def pull_off(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = ()) -> Figure:
     """Draw the pull-off pressure (mean over the seeds) against slope, and against the largest load of the path."""
     studies = list(dict.fromkeys([study, *load_studies]))
-    by_slope = select_detached_lines(campaign, [study], _Y, along_slopes=True)
-    by_load = select_detached_lines(campaign, list(dict.fromkeys(load_studies)), _Y)
+    by_slope = select.select_detached_lines(campaign, [study], _Y, along_slopes=True)
+    by_load = select.select_detached_lines(campaign, list(dict.fromkeys(load_studies)), _Y)
     groups = list(itertools.chain(*by_slope.values(), *by_load.values()))
     if len({group.labels.rms_slope for group in groups}) == 1:  # the same markers in both panels
         by_load = {line._replace(rms_slope=None): found for line, found in by_load.items()}
@@ -231,7 +224,7 @@ def pull_off(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] =
         "Points at one slope or load are drawn side by side; lines guide the eye.",
         """The pull-off force of a shape is the pull-off pressure times the area of the square; it is the variable
         `pull_off_force`."""
-        if any(has_shape(campaign[each].to_dataset()) for each in studies)
+        if any(select.has_shape(campaign[each].to_dataset()) for each in studies)
         else "",
         grid_of_loops(campaign, studies),
     )
@@ -311,10 +304,10 @@ the loss."""
 def loss(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
     """Draw the loss of runs with adhesion (mean over the seeds), and the parts of this loss by cause."""
     studies = list(dict.fromkeys(studies))
-    lines = select_detached_lines(campaign, studies, "hysteresis_loss")
+    lines = select.select_detached_lines(campaign, studies, "hysteresis_loss")
     lines = {line: found for line, found in lines.items() if found[0].surface_energy > 0}
     if not lines:
-        raise NothingToDraw(f"studies {', '.join(studies)}: no run with adhesion; the figure needs a surface energy")
+        raise select.NothingToDraw(f"studies {', '.join(studies)}: no run with adhesion; {_NEEDED}")
     looks = Looks(campaign, studies, lines, by_place=None)
     truths = {line: lines[line] for line in lines if looks.is_beside(line)}
     lines = {line: found for line, found in lines.items() if line not in truths} | truths
@@ -396,7 +389,7 @@ def fit_line(x: np.ndarray, y: np.ndarray, along: np.ndarray) -> tuple[np.ndarra
     return line.intercept + line.slope * along, line.rvalue**2, exponent
 
 
-def shares(line: Sequence[ContactRuns]) -> dict[str, float]:
+def shares(line: Sequence[select.ContactRuns]) -> dict[str, float]:
     """Return the parts of the loss at the largest load of a line, divided by the sum of the magnitudes of all parts."""
     parts = Points(line, "largest_reduced_pressure", *PARTS).means[1:, -1]
     total = np.abs(parts).sum()

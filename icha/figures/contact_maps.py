@@ -15,9 +15,10 @@ from icha.contact.model import EVENT_KINDS
 from icha.datasets.campaign import find_snapshot
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of
+from icha.figures import select
 from icha.figures.captions import attractions_of, grid_of_loops, range_of_attraction
 from icha.figures.drawn import Name, plot, record, say
-from icha.figures.looks import BRANCH_DASHES, REFERENCE_NAME, graded_colours, legend_below, run_label
+from icha.figures.looks import BRANCH_DASHES, REFERENCE_NAME, graded_colours, legend_below, run_label, some_of
 from icha.figures.maps import (
     average_blocks,
     draw_map,
@@ -26,16 +27,6 @@ from icha.figures.maps import (
     spot_circles,
     topography_of,
     without_images,
-)
-from icha.figures.select import (
-    NothingToDraw,
-    doubt_about,
-    doubt_about_loop,
-    select_by_labels,
-    select_complete_run,
-    select_runs,
-    snapshot_label,
-    unloading_legs,
 )
 from icha.figures.style import (
     BLACK,
@@ -90,7 +81,7 @@ def contact_map(
     `truth` is the same run with boundary elements, including contact maps; None without such a run.
     """
     labels = RunLabels(*run)
-    data = select_complete_run(campaign, labels)
+    data = select.select_complete_run(campaign, labels)
     at = find_snapshot(data, kind, target)
     state, beside = state_of(data, at), None
     kind, target = str(data["snapshot_kind"].values[at]), float(data["snapshot_target"].values[at])
@@ -124,7 +115,7 @@ def contact_map(
         say(fig, "The map is one period; circles continue across its borders.")
     load = rf"$F/(E^{{\ast}}h′_{{\mathrm{{rms}}}}A_0)$ = {format_number(float(state['reduced_pressure']))}"
     title = f"{run_label(campaign, labels)}, {load}"
-    fig.suptitle(f"{title}\n{doubt_about(data)}".rstrip(), fontsize="medium")
+    fig.suptitle(f"{title}\n{select.doubt_about(data)}".rstrip(), fontsize="medium")
     for ax in panels.ravel():
         topography.label(ax)
         if ax is not enlarged:
@@ -202,7 +193,7 @@ def spots_by_slope(
     material: str | None = None,
 ) -> Figure:
     """Draw the spots of all slopes for one surface, seed and material; the defaults are those of the first run."""
-    runs = select_by_labels(select_runs(campaign, study), surface=surface, seed=seed, material=material)
+    runs = select.select_by_labels(select.select_runs(campaign, study), surface=surface, seed=seed, material=material)
     runs = sorted(runs, key=lambda each: -each[0].rms_slope)
     # Slopes have colours from dark to bright, because the other colours stand for materials.
     colours = graded_colours(len(runs))
@@ -223,7 +214,7 @@ def spots_by_slope(
     panels[0].set_ylabel(f"$y$ ({unit})")
     handles = {}
     for (labels, run), colour in zip(runs, colours, strict=True):
-        name = slope_label(labels.rms_slope) + (f" ({doubt})" if (doubt := doubt_about(run)) else "")
+        name = slope_label(labels.rms_slope) + (f" ({doubt})" if (doubt := select.doubt_about(run)) else "")
         handles[name] = Patch(facecolor=colour)
     legend_below(fig, handles)
     return fig
@@ -247,7 +238,7 @@ def _draw_slopes(ax, runs, kind, colours, length):
             ax.add_collection(PatchCollection([Wedge((x, y), r, start, start + share) for x, y, r in circles], **look))
     ax.set(xlim=(0, side), ylim=(0, side))
     sectors = "" if kind == "relative_load" or len(runs) == 1 else ", a sector for each slope"
-    ax.set_title(snapshot_label(run, at[k]) + sectors, loc="right")
+    ax.set_title(select.snapshot_label(run, at[k]) + sectors, loc="right")
 
 
 # --- figure 16 ---
@@ -276,7 +267,7 @@ unloading against the mean separation, in the colours of panel (a); thin lines c
 def snap_map(campaign: xr.DataTree, surface: xr.Dataset, *, run: Sequence) -> Figure:
     """Draw the events of one run on a map of the topography, and the number of events against the mean separation."""
     labels = RunLabels(*run)
-    data = select_complete_run(campaign, labels)
+    data = select.select_complete_run(campaign, labels)
     events = _events(data)
     fig, [(where, when)] = new_panels(3.1, width_ratios=(1.3, 1))
     say(fig, _EVENTS, grid_of_loops(campaign, [labels.study]))
@@ -285,7 +276,7 @@ def snap_map(campaign: xr.DataTree, surface: xr.Dataset, *, run: Sequence) -> Fi
     title = f"{material_label(campaign[labels.study].to_dataset(), labels.material)}, {slope_label(labels.rms_slope)}"
     when.set_title(title, loc="right", fontsize="small")
     handles |= {name: legend_handle(color=GREY, ls=dashes, lw=1.1) for name, dashes in BRANCH_DASHES.items()}
-    if doubt := doubt_about_loop(data):
+    if doubt := select.doubt_about_loop(data):
         handles |= {doubt: legend_handle(ls="none")}
     legend_below(fig, handles)
     return fig
@@ -333,7 +324,7 @@ def _events(run):
     """Return kind, branch, position (m) and separation u/h_rms of the events in first loading and last unloading."""
     steps = run["event_step"].values.astype(int)
     leg = run["leg"].sel(step=steps).values
-    shown = (leg == 0) | (leg == unloading_legs(run)[-1]["leg"].values[-1])
+    shown = (leg == 0) | (leg == select.unloading_legs(run)[-1]["leg"].values[-1])
     return {
         "kind": np.array(EVENT_KINDS)[run["event_kind"].values[shown].astype(int)],
         "branch": run["branch"].sel(step=steps).values.astype(object)[shown],
@@ -363,13 +354,11 @@ the contact area, to which cells at the edges contribute in part."""
 def pressure_maps(campaign: xr.DataTree, maps: xr.Dataset, *, run: Sequence) -> Figure:
     """Draw the pressure at the snapshots of a run; with more than six snapshots, at six of them."""
     labels = RunLabels(*run)
-    select_complete_run(campaign, labels)
-    count = maps.sizes.get("snapshot", 0)
+    select.select_complete_run(campaign, labels)
     touching = maps["contact_map"].transpose("snapshot", "row", "column").values > 0
     if not touching.any():
-        raise NothingToDraw(f"{labels}: no snapshot has contact")
-    order = np.argsort(maps["snapshot_step"].values, kind="stable")
-    shown = order[np.unique(np.rint(np.linspace(0, count - 1, min(count, _MOST_MAPS))).astype(int))]
+        raise select.NothingToDraw(f"{labels}: no snapshot has contact")
+    shown = some_of(np.argsort(maps["snapshot_step"].values, kind="stable"), _MOST_MAPS)
     pressure = maps["contact_pressure"].transpose("snapshot", "row", "column").values
     inside = np.abs(pressure[touching])
     factor, unit = choose_unit(float(np.quantile(inside, _COVERED)), "Pa")
@@ -382,9 +371,13 @@ def pressure_maps(campaign: xr.DataTree, maps: xr.Dataset, *, run: Sequence) -> 
     side = float(maps["period"]) * length
     labels_of_axes = {f"{axis}label": f"${axis}$ ({length_unit})" for axis in "xy"}
     fig, panels = new_grid(len(shown), 3, 2.7, 2.15, room=(0.65, 0.1), **labels_of_axes, sharex=True, sharey=True)
-    free = str(maps["boundary"].values) == "free"
     say(fig, _PRESSURES)
-    window = _touched_region(touching.any(axis=0), free)
+    window = (0.0, 1.0)
+    if str(maps["boundary"].values) == "free":  # only the region of contact
+        touched = touching.any(axis=0)
+        places = np.flatnonzero(touched.any(axis=0) | touched.any(axis=1)) / len(touched)
+        room = _MARGIN * (np.ptp(places) or 1.0)
+        window = (max(places[0] - room, 0.0), min(places[-1] + room, 1.0))
     for ax, k in zip(panels, shown, strict=True):
         cells = np.where(touching[k], pressure[k] * factor, np.nan)
         half = side / len(cells) / 2
@@ -397,7 +390,7 @@ def pressure_maps(campaign: xr.DataTree, maps: xr.Dataset, *, run: Sequence) -> 
             norm=TwoSlopeNorm(0, -least, most),
         )
         ax.set_title(_name_state(maps, k), loc="right", fontsize=8)
-        ax.set(xlim=np.array(window) * side, ylim=np.array(window) * side)
+        ax.set(xlim=np.multiply(window, side), ylim=np.multiply(window, side))
         ax.set_facecolor("0.8")
         _record_pressures(ax, cells / factor, side, Name(_branch(maps, k), labels))
     bar = fig.colorbar(image, ax=panels, shrink=0.9, pad=0.015, aspect=28, extend="both")
@@ -406,15 +399,6 @@ def pressure_maps(campaign: xr.DataTree, maps: xr.Dataset, *, run: Sequence) -> 
     bar.set_ticks(ends, labels=[format_number(float(f"{value:.2g}")) for value in ends])
     fig.suptitle(run_label(campaign, labels), fontsize="medium")
     return fig
-
-
-def _touched_region(touched, free):
-    """Return the lower and the upper limit of both axes, divided by the side; on a periodic surface, 0 and 1."""
-    if not free:
-        return 0.0, 1.0
-    places = np.flatnonzero(touched.any(axis=0) | touched.any(axis=1)) / len(touched)
-    room = _MARGIN * (np.ptp(places) or 1.0)
-    return max(places[0] - room, 0.0), min(places[-1] + room, 1.0)
 
 
 def _record_pressures(ax, cells, side, name):

@@ -134,12 +134,12 @@ def study_curves(
     boundary_elements: str | None = None,
     *,
     panel: Panel | None = None,
-    **changed: object,
+    open_markers: bool = False,
 ) -> Curves:
     """Return the curves of a study, with boundary elements of the same study or of the study `boundary_elements`.
 
-    Curves without points in the `panel` are left out, if it is given. `changed` are arguments of `Axes.plot` that
-    replace the usual arguments of all markers.
+    Curves without points in the `panel` are left out, if it is given. `open_markers` do not hide each other where
+    curves coincide; if colours distinguish surfaces and slopes, markers are closed for materials with adhesion.
     """
 
     def has_points(group):
@@ -155,6 +155,7 @@ def study_curves(
     materials = dataset["material"].values.tolist()
     drawn = sorted((group.line for group in groups), key=lambda line: materials.index(line.material))
     looks = Looks(campaign, [study], drawn, crosses=bool(grouped) or name != ASPERITIES_NAME)
+    changed: dict[str, object] = {"mfc": "none"} if open_markers and not looks.by_place else {}
     for group in groups:
         look = looks.look(group.line) | {"ls": "-" if looks.many else "none"} | changed
         if name != ASPERITIES_NAME:

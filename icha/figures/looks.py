@@ -285,9 +285,9 @@ def distinct_colours(count: int) -> Sequence[str]:
     return COLOURS[:count] if count <= MOST_COLOURS else graded_colours(count)
 
 
-def some_of(names: Sequence) -> list:
-    """Return all names if they are few; otherwise return some, evenly spaced, including the first and the last."""
-    at = np.unique(np.rint(np.linspace(0, len(names) - 1, min(len(names), _MOST_NAMED))).astype(int))
+def some_of(names: Sequence, most: int = _MOST_NAMED) -> list:
+    """Return all names if they are at most `most`; otherwise some, evenly spaced, with the first and the last."""
+    at = np.unique(np.rint(np.linspace(0, len(names) - 1, min(len(names), most))).astype(int))
     return [names[k] for k in at]
 
 

@@ -277,15 +277,14 @@ def select_snapshots(
     """Return the same snapshot of every run on the first surface and slope of a study, for the `shown_model`."""
     groups = group_by_contact(campaign, select_runs(campaign, study))
     alone = groups[0].labels.model == REFERENCE_MODEL
-    reference = [] if alone else group_by_contact(campaign, select_runs(campaign, study, model=REFERENCE_MODEL))
+    others = [] if alone else select_runs(campaign, study, model=REFERENCE_MODEL)
     found = []
     for group in groups:
         if group.line.place == groups[0].line.place:
             members = [(run, find_snapshot(run, kind, target)) for run in group.by_seed.values()]
             run, at = members[0]
             state = str(run["snapshot_kind"].values[at]), float(run["snapshot_target"].values[at])
-            alike = [each for each in reference if each.line.contact == group.line.contact]
-            beside = [run for each in alike for run in each.by_seed.values()]
+            beside = [run for labels, run in others if Line.of(labels).contact == group.line.contact]
             truths = [(truth, snapshot_if_any(truth, *state)) for truth in beside]
             found.append(Snapshots(group, members, [truth for truth in truths if truth[1] is not None]))
     return found

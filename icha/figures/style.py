@@ -85,12 +85,12 @@ def new_panels(
 ) -> tuple[Figure, np.ndarray]:
     """Return a figure and an array of panels; `options` are those of `Figure.subplots`.
 
-    Several panels have the marks (a), (b), ….
+    Several panels have the marks (a), (b), … outside their upper left corners.
     """
     figure = new_figure(width, height)
     panels = figure.subplots(rows, columns, squeeze=False, **options)
     for axes, letter in zip(panels.ravel() if panels.size > 1 else (), ascii_lowercase, strict=False):
-        panel_label(axes, letter)
+        axes.set_title(f"({letter})", loc="left", fontweight="bold")
     return figure, panels
 
 
@@ -172,11 +172,6 @@ def limits_around(values: np.ndarray) -> tuple[float, float]:
 def legend_handle(x=(), y=(), **look) -> Line2D:
     """Return a line that is only drawn in a legend; `look` are keyword arguments of `Axes.plot`."""
     return Line2D(x, y, **look)
-
-
-def panel_label(axes: Axes, letter: str) -> None:
-    """Mark a panel as (a), (b), … outside its upper left corner."""
-    axes.set_title(f"({letter})", loc="left", fontweight="bold")
 
 
 def format_number(value: float) -> str:

@@ -17,17 +17,9 @@ import xarray as xr
 from icha.checks.findings import Check
 from icha.contact.models import MODEL_PAPER
 from icha.datasets.results import figure_number
+from icha.report import tables
 from icha.report.answers import answers_of, answers_table, distribution_words, samples_table, sentences
 from icha.report.spectra import picture_of_spectra
-from icha.report.tables import (
-    checks_tables,
-    count_runs,
-    failures,
-    materials_table,
-    sources_table,
-    studies_table,
-    surfaces_table,
-)
 from icha.report.template import write_page
 from icha.report.validity import statements_on_results
 from icha.support.formatting import format_count
@@ -77,12 +69,12 @@ def write_report(
 
     checks, surfaces = list(checks), list(surfaces)
     studies = {name: node.to_dataset() for name, node in campaign.children.items()}
-    reasons, not_valid = failures(studies, link(Path(results, "runs")) if results is not None else None)
+    reasons, not_valid = tables.failures(studies, link(Path(results, "runs")) if results is not None else None)
     values = {
         "title": campaign.attrs.get("title", "Rough contact campaign"),
         "summary": campaign.attrs.get("summary", ""),
         "attributes": campaign.attrs,
-        "runs": sum(map(count_runs, studies.values()), Counter()),
+        "runs": sum(map(tables.count_runs, studies.values()), Counter()),
         "statements": statements_on_results(campaign, model_error),
         "answers": [] if answers is None else [_answers(name, node) for name, node in answers.children.items()],
         "samples": []
@@ -91,11 +83,11 @@ def write_report(
         "reasons": reasons,
         "not_valid": not_valid,
         "figures": _pictures(figures, link),
-        "parameters": [studies_table(studies), materials_table(studies), surfaces_table(surfaces)],
-        "sources": sources_table(surfaces),
+        "parameters": [tables.studies_table(studies), tables.materials_table(studies), tables.surfaces_table(surfaces)],
+        "sources": tables.sources_table(surfaces),
         "spectra": picture_of_spectra(surfaces),
         "checks": checks,
-        "checked": checks_tables(checks),
+        "checked": tables.checks_tables(checks),
         "files": {name: link(target) for name, target in files.items()},
         "study": next(iter(studies), ""),
         "configuration": configuration,

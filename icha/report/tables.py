@@ -110,8 +110,8 @@ def _run(run: RunLabels, folder: str | None = None) -> str:
 
 
 def _reason(study: xr.Dataset, name: str, run: RunLabels) -> str:
-    """Return the text of `failure` or `applicability` of a run; empty text if the dataset has no such variable."""
-    return str(study[name].isel(run_place(study, run)).item()) if name in study else ""
+    """Return the text of `failure` or `applicability` of a run."""
+    return study[name].isel(run_place(study, run)).item()
 
 
 def studies_table(studies: Mapping[str, xr.Dataset]) -> Table:

@@ -12,21 +12,7 @@ from icha.datasets.attributes import reasons_not_applicable
 from icha.datasets.campaign import loading_stops
 from icha.datasets.labels import LABELS, is_derived_study
 from icha.datasets.variables.campaign import COMPLETE, COMPUTED_RUNS, NOT_IN_DESIGN
-from icha.planning.statements import (
-    COMPLETE_PRESSURE,
-    RESOLVED,
-    SHAPED,
-    SPACING,
-    STRENGTH,
-    TABOR,
-    THEORETICAL,
-    VALIDATED,
-    Case,
-    Statement,
-    describe_layers,
-    describe_sticky,
-    statements,
-)
+from icha.planning import statements as stated
 from icha.support.formatting import format_count, join_first
 from icha.surfaces.resolution import RADIUS, Resolution
 from icha.uncertainty.grid_error import cells_of_loops, error_of_area, nodes_of
@@ -34,14 +20,15 @@ from icha.uncertainty.left_out import NOT_COMPARED, NOT_REQUESTED, find_left_out
 
 _QUANTITIES = {"area_error": "contact area", "separation_error": "mean separation"}
 # Variables of a run that are facts of a `Case`, and those from which further facts follow.
-_FACTS = (*VALIDATED, COMPLETE_PRESSURE, STRENGTH, THEORETICAL, RESOLVED, TABOR)
+_FACTS = (*stated.VALIDATED, stated.COMPLETE_PRESSURE, stated.STRENGTH, stated.THEORETICAL, stated.RESOLVED)
+_FACTS += (stated.TABOR,)
 _SOURCES = ("status", "period", "grid", "asperity_count", "unsupported_summit_count", "boundary", "surface_energy")
 _SOURCES += ("short_wavelength", "short_wavelength_estimated", "shape")
 # Statements name contacts with more than this fraction of single-asperity spots outside the range of Wu's formula.
 _FEW = 0.05
 
 
-def statements_on_results(campaign: xr.DataTree, model_error: xr.DataTree | None) -> list[Statement]:
+def statements_on_results(campaign: xr.DataTree, model_error: xr.DataTree | None) -> list[stated.Statement]:
     """Return statements on the validity of the models, with the measured errors of the asperity model first.
 
     If all studies with the asperity model have a measured error, the statement on the accuracy on other surfaces is
@@ -49,13 +36,13 @@ def statements_on_results(campaign: xr.DataTree, model_error: xr.DataTree | None
     """
     measured = {} if model_error is None else measured_errors(model_error)
     with_asperities = {name for name, node in campaign.children.items() if DEFAULT_MODEL in node["model"].values}
-    statements = statements_on_dataset(campaign)
+    found = statements_on_dataset(campaign)
     if with_asperities <= measured.keys():
-        statements = [each for each in statements if each.about != "accuracy"]
-    return [*measured.values(), *statements]
+        found = [each for each in found if each.about != "accuracy"]
+    return [*measured.values(), *found]
 
 
-def measured_errors(model_error: xr.DataTree) -> dict[str, Statement]:
+def measured_errors(model_error: xr.DataTree) -> dict[str, stated.Statement]:
     """Return a statement for each study in the dataset `model_error`, by name of the study."""
     found = {}
     for name, node in model_error.children.items():
@@ -76,7 +63,7 @@ def measured_errors(model_error: xr.DataTree) -> dict[str, Statement]:
         status = errors["status"].values.ravel()
         causes = np.select([status == NOT_IN_DESIGN, status != COMPLETE], [NOT_REQUESTED, NOT_COMPARED], "")
         among += f"; {words}" if (words := find_left_out("pairs of runs", causes).sentence) else ""
-        found[name] = Statement(
+        found[name] = stated.Statement(
             "error", f"of the asperity model in study {name}: {ranges} ({among}, boundary elements)"
         )
     return found
@@ -92,7 +79,7 @@ def _range(values: np.ndarray) -> str:
     return f"from {-low:.0f} % too small to {high:.0f} % too large"
 
 
-def statements_on_dataset(campaign: xr.DataTree) -> list[Statement]:
+def statements_on_dataset(campaign: xr.DataTree) -> list[stated.Statement]:
     """Return statements on the validity of the models for a campaign dataset, including runs that ended early.
 
     If the dataset is open and not loaded, only a few variables are read from the file.
@@ -110,12 +97,12 @@ def statements_on_dataset(campaign: xr.DataTree) -> list[Statement]:
                 found = study["stickiness"].sel(surface=surface, material=material)
                 sticky[surface, material] = max(float(found.max()), sticky.get((surface, material), 0.0))
     outside = _describe_shares(shares) if shares else None
-    found = statements(models, cases, outside, describe_sticky(sticky), cells_of_loops(campaign, models))
-    found += [*_lightest_state(campaign, models), *describe_layers(_radii_on_layers(campaign))]
+    found = stated.statements(models, cases, outside, stated.describe_sticky(sticky), cells_of_loops(campaign, models))
+    found += [*_lightest_state(campaign, models), *stated.describe_layers(_radii_on_layers(campaign))]
     return [*found, *_not_applicable(campaign)]
 
 
-def _cases(study) -> Iterator[Case]:
+def _cases(study) -> Iterator[stated.Case]:
     """Yield a `Case` for every computed run of a study."""
     runs = study[[name for name in (*_FACTS, *_SOURCES) if name in study]].broadcast_like(study["status"])
     if "shape" in study:
@@ -126,19 +113,19 @@ def _cases(study) -> Iterator[Case]:
         if row["status"] not in COMPUTED_RUNS:
             continue
         facts = {name: float(row[name]) for name in _FACTS if name in row}
-        facts[SPACING] = row["period"] / row["grid"]
+        facts[stated.SPACING] = row["period"] / row["grid"]
         if not row["surface_energy"]:
-            facts.pop(TABOR, None)
+            facts.pop(stated.TABOR, None)
         estimated = bool(row["short_wavelength_estimated"])
-        resolution = Resolution(row["short_wavelength"] / facts[SPACING], estimated=estimated)
+        resolution = Resolution(row["short_wavelength"] / facts[stated.SPACING], estimated=estimated)
         facts["nodes_per_short_wave"] = resolution.cells
         if "contact_radius" in row and not row["rms_slope"]:
-            resolution = min(resolution, Resolution(row["contact_radius"] / facts[SPACING], RADIUS))
+            resolution = min(resolution, Resolution(row["contact_radius"] / facts[stated.SPACING], RADIUS))
         unsupported = row["unsupported_summit_count"]
         facts["unsupported_summits"] = unsupported / max(row["asperity_count"] + unsupported, 1)
-        facts[SHAPED] = float(bool(row.get("shape")))
+        facts[stated.SHAPED] = float(bool(row.get("shape")))
         facts["free_edges"] = float(row["boundary"] != "periodic")
-        yield Case(row["model"], row["surface"], row["material"], facts, resolution)
+        yield stated.Case(row["model"], row["surface"], row["material"], facts, resolution)
 
 
 def _smallest_radii(study):
@@ -170,7 +157,7 @@ def _shares_outside(study):
     return shares.transpose("surface", "material").to_series().dropna().to_dict()
 
 
-def _lightest_state(campaign: xr.DataTree, studies: Iterable[str]) -> Iterator[Statement]:
+def _lightest_state(campaign: xr.DataTree, studies: Iterable[str]) -> Iterator[stated.Statement]:
     """Yield the statement on the error of the area with the fewest cells, at targets of boundary elements.
 
     Only targets of the first loading count.
@@ -187,7 +174,7 @@ def _lightest_state(campaign: xr.DataTree, studies: Iterable[str]) -> Iterator[S
             patches = float(runs["spot_count"].transpose(*cells.dims).isel(at))
             text = f"{error_of_area(patches, least)[1]} ({names}, at the smallest load)"
     if text:
-        yield Statement("grid", text)
+        yield stated.Statement("grid", text)
 
 
 def _radii_on_layers(campaign):
@@ -205,9 +192,9 @@ def _radii_on_layers(campaign):
     return shares
 
 
-def _not_applicable(campaign) -> Iterator[Statement]:
+def _not_applicable(campaign) -> Iterator[stated.Statement]:
     """Yield the statement on the runs for which the asperity model is not applicable."""
     reasons = sum(map(reasons_not_applicable, campaign.children.values()), Counter())
     if reasons:
         text = f"a model is not applicable to {format_count(reasons.total(), 'run')}: {join_first(reasons, '. ')}"
-        yield Statement("applicability", text, False)
+        yield stated.Statement("applicability", text, False)
