@@ -480,19 +480,12 @@ class ShortRange:
     def bonds(self, fraction: np.ndarray) -> Bonds:
         """Return the law of every cell, with the work at the present fractions; only neighbours of contact attract."""
         cells = np.flatnonzero(with_neighbours(fraction > 0))
-        work = (1 - PERIMETER) * at_cells(self.adhesion_length, cells) + self._work_by_fractions(fraction).ravel()[
-            cells
-        ]
+        length = at_cells(self.adhesion_length, cells)
+        # Work and perimeter term follow from one energy, so a cell also has half of the works of its neighbours.
+        own = length * average(fraction).ravel()[cells]
+        by_others = own if np.ndim(length) == 0 else average(self.adhesion_length * fraction).ravel()[cells]
+        work = (1 - PERIMETER) * length + PERIMETER * (own + by_others)
         return directed(LinearBonds(cells, work, np.sqrt(2 * BOND_COMPLIANCE * work)), self.ratio, self.before)
-
-    def _work_by_fractions(self, fraction):
-        """Return the part of the works of adhesion that the fractions cause, (n, n): the perimeter term.
-
-        Work and perimeter term follow from one energy, so a cell also has half of the works of its neighbours.
-        """
-        length = self.adhesion_length
-        by_own = length * average(fraction)
-        return PERIMETER * (by_own + (by_own if np.ndim(length) == 0 else average(length * fraction)))
 
     @property
     def straight_strength(self) -> float:
