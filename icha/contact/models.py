@@ -63,7 +63,7 @@ class PathAccuracy:
 
     target: float = 1e-9
     event: float = 1e-12
-    work: float = 1e-6
+    work: float = 3e-7
     reversible_work: float = 3e-6
     tension: float = 1e-8
 
