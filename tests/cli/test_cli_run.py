@@ -91,15 +91,6 @@ def test_a_job_that_crashes_is_named_with_its_log_and_stops_no_other(project):
 
 
 @pytest.mark.slow
-def test_an_end_that_physics_decides_is_a_result(project):
-    output = run(project, "dataset")
-    assert "1 run ended before the last target, as physics decides; all reasons: results/tiny/logs/ended" in output
-    assert "\n    load/rough/seed1/slope1/sticky: the path ends at" in output and " (1 seed)\n" in output
-    reasons = (project / "results/tiny/logs/ended_runs.txt").read_text()
-    assert reasons.startswith("load/rough/seed1/slope1/sticky: the path ends at") and reasons.count("\n") == 1
-
-
-@pytest.mark.slow
 def test_a_run_that_fails_leaves_a_dataset_and_is_listed_with_its_reason(project):
     # The snapshot is far above the surface.
     far = yaml.safe_load(TINY) | {"name": "far"}

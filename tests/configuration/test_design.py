@@ -11,7 +11,6 @@ from icha.configuration.cases import (
     campaign_sha256,
     run_settings,
     run_sha256,
-    surface_cases,
     surface_settings,
 )
 from icha.configuration.design import sampled_parameters, varied_values
@@ -25,14 +24,6 @@ from icha.planning.results import campaign_files
 
 def paths(campaign):
     return [case.path.removeprefix("one/") for case in campaign.all_runs]
-
-
-def test_random_surfaces_and_files_share_a_study(load, tmp_path):
-    np.save(tmp_path / "own.npy", np.random.default_rng(1).random((16, 16)))
-    changes = {"surfaces.own": file_surface("own.npy"), "studies.one.surfaces": ["rough", "own"]}
-    campaign = load(changes | {"confirmed": ["surfaces.own.path"]}).campaign
-    assert surface_cases(campaign) == [("rough", 1), ("rough", 2), ("own", 0)]
-    assert len(paths(campaign)) == 2 * 2 + 2
 
 
 def test_parameters_are_varied_each_with_each(load):
@@ -312,14 +303,6 @@ def test_beside_boundary_elements_targets_may_lie_beyond_asperities(load):
     """Asperities end loading at the limit of their range, but they must begin it."""
     beyond = {"studies.one.targets.reduced_pressures": [0.1, 0.5]}
     assert load(BOTH | beyond) and load(ALONE | beyond)
-
-
-def test_other_models_have_a_folder_of_their_own(load):
-    campaign = load(BOTH).campaign
-    paths = [case.path for case in campaign.all_runs]
-    assert paths[0] == "one/rough/seed1/slope0.2/soft" and paths[4] == "one/rough/seed1/slope0.2/boundary_elements/soft"
-    assert list(campaign_files(campaign).runs)[-1] == "runs/one/rough/seed2/slope1/boundary_elements/soft.nc"
-    assert len({run_sha256(campaign, case) for case in campaign.all_runs}) == 8
 
 
 def test_boundary_elements_are_planned_as_a_part_of_their_own_at_their_own_cost(load, tmp_path):

@@ -34,10 +34,7 @@ def test_a_smooth_surface_has_neither_seeds_nor_slopes(load):
         ({"cylinder_punch": {"radius": "30 um"}}, CylinderPunch(30e-6)),
         ({"flat_punch": {"side": "50 um"}}, FlatPunch(50e-6)),
         ({"cone": {"half_angle": "80 deg"}}, Cone(math.radians(80))),
-        (
-            {"wave": {"radius": "1 mm", "amplitude": "-100 nm", "wavelength": "20 um"}},
-            Wave(1e-3, -100e-9, 20e-6),
-        ),
+        ({"wave": {"radius": "1 mm", "amplitude": "-1 um", "wavelength": "20 um"}}, Wave(1e-3, -1e-6, 20e-6)),
     ],
     ids=lambda each: next(iter(each)) if isinstance(each, dict) else "",
 )
@@ -69,34 +66,22 @@ def test_the_thickness_of_a_layer_is_varied(load):
 
 
 @pytest.mark.parametrize(
-    ("changes", "message"),
+    ("shape", "energy", "targets", "key", "radius"),
     [
         # Radius of JKR at the indentation 0: a^3 = 2 pi w R^2/E*, with 50 mJ/m^2, 10 mm and 25 MPa.
-        (
-            {"surfaces.ball.shape": {"sphere": {"radius": "10 mm"}}},
-            "one.surfaces: ['ball'] gives 'soft' on 'ball' a contact radius of about 108 um after the jump-in",
-        ),
+        ({"sphere": {"radius": "10 mm"}}, 50, {"forces": ["0.1 mN"]}, "surfaces: ['ball']", "108 um after the jump-in"),
         # Sneddon's cone: a^2 = 2 F tan(80 deg)/(pi E*).
-        (
-            {
-                "surfaces.ball.shape": {"cone": {"half_angle": "80 deg"}},
-                "materials.soft.surface_energy": "0 J/m^2",
-                "studies.one.targets": {"forces": ["1 mN", "100 mN"]},
-            },
-            "one.targets.forces[1]: '100 mN' gives 'soft' on 'ball' a contact radius of about 120 um",
-        ),
+        ({"cone": {"half_angle": "80 deg"}}, 0, {"forces": ["1 mN", "0.1 N"]}, "targets.forces[1]: '0.1 N'", "120 um"),
         # 10 MPa on (200 um)^2 are 0.4 N: 229 um by Hertz, with 1 mm and 25 MPa; JKR adds 4 um.
-        (
-            {"studies.one.targets": {"pressures": ["10 kPa", "10 MPa"]}},
-            "pressures[1]: '10 MPa' gives 'soft' on 'ball' a contact radius of about 233 um",
-        ),
+        (BALL["shape"], 50, {"pressures": ["10 kPa", "10 MPa"]}, "targets.pressures[1]: '10 MPa'", "233 um"),
     ],
-    ids=["jump-in", "cone", "pressure"],
 )
-def test_contacts_that_reach_the_edges_are_refused(changes, message, refused):
-    alone = {"surfaces.ball": dict(BALL), "studies.one.surfaces": ["ball"], "studies.one.rms_slopes": None}
-    study = {"studies.one.targets": {"forces": ["0.1 mN"]}, "studies.one.snapshots": None}
-    refused("", alone | BY_CELLS | study | changes, message)
+def test_contacts_that_reach_the_edges_are_refused(shape, energy, targets, key, radius, refused):
+    alone = {"surfaces.ball": BALL | {"shape": shape}, "materials.soft.surface_energy": f"{energy} mJ/m^2"}
+    study = {"surfaces": ["ball"], "rms_slopes": None, "snapshots": None, "targets": targets}
+    changes = {f"studies.one.{name}": value for name, value in study.items()}
+    message = f"studies.one.{key} gives 'soft' on 'ball' a contact radius of about {radius}"
+    refused("", alone | BY_CELLS | changes, message)
 
 
 def test_a_contact_smaller_than_that_of_pull_off_is_refused(refused, load):

@@ -19,6 +19,9 @@ def test_the_slope_that_a_topography_has(load, tmp_path):
     heights = amplitude * np.sin(2 * np.pi / period * x) * np.ones((size, 1))
     np.save(tmp_path / "own.npy", heights * 1e6)
     campaign = load({"surfaces.rough": file_surface("own.npy"), "studies.one.rms_slopes": "measured"}).campaign
+    assert surface_cases(campaign) == [("rough", 0)]
+    assert campaign.surfaces["rough"].path == str(tmp_path / "own.npy")
+    assert surface_settings(campaign, "rough") == {"kind": "file", "period": 1e-3, "metres_per_unit": 1e-6}
     (case,) = campaign.all_runs
     assert case.rms_slope == pytest.approx(2 * np.pi / period * amplitude / np.sqrt(2), rel=1e-5)
     assert case.path == f"one/rough/seed0/slope{number_label(case.rms_slope)}/soft"
@@ -38,21 +41,10 @@ def test_surface_files_are_read_before_anything_runs(heights, message, load, tmp
     np.save(tmp_path / "heights.npy", heights)
     with pytest.raises(ConfigurationError, match=f"surfaces.rough.path: .*{message}"):
         load({"surfaces.rough": file_surface("heights.npy")})
-
-
-def test_damaged_surface_files(load, tmp_path):
-    for name in ("heights.npy", "heights.nc", "heights.txt"):
-        (tmp_path / name).write_bytes(b"nothing of the kind")
+    for ending in ("npy", "nc", "txt"):
+        (tmp_path / f"damaged.{ending}").write_bytes(b"nothing of the kind")
         with pytest.raises(ConfigurationError, match="cannot be read"):
-            load({"surfaces.rough": file_surface(name)})
-
-
-def test_a_surface_file_is_one_realisation_beside_the_configuration(load, tmp_path):
-    np.save(tmp_path / "heights.npy", np.random.default_rng(1).normal(size=(16, 16)))
-    campaign = load({"surfaces.rough": file_surface("heights.npy"), "confirmed": ["surfaces.rough.path"]}).campaign
-    assert surface_cases(campaign) == [("rough", 0)]
-    assert campaign.surfaces["rough"].path == str(tmp_path / "heights.npy")
-    assert surface_settings(campaign, "rough") == {"kind": "file", "period": 1e-3, "metres_per_unit": 1e-6}
+            load({"surfaces.rough": file_surface(f"damaged.{ending}")})
 
 
 def test_surfaces_with_a_tabulated_spectrum_have_seeds_and_the_slope_of_their_table(load, refused, tmp_path):

@@ -96,9 +96,8 @@ def test_model_is_the_first_dimension_of_every_study(runs, tmp_path):
     assert LABELS[0] == "model"
     tree = small.tree()
     for study in tree.children.values():
-        assert study["contact_area_fraction"].dims == (*LABELS, "step") and study["model"].values.tolist() == [
-            DEFAULT_MODEL
-        ]
+        assert study["contact_area_fraction"].dims == (*LABELS, "step")
+        assert study["model"].values.tolist() == [DEFAULT_MODEL]
     write_dataset(campaign_tree(runs.items(), attrs={"campaign": "both", "license": "CC0-1.0"}), tmp_path / "both.nc")
     tree = read_campaign(tmp_path / "both.nc")
     study = tree["one"].to_dataset()

@@ -151,6 +151,9 @@ def test_steps_that_fail_are_halved_and_then_given_up(surface):
     assert 2.0**-14 <= min(widths) / max(widths) < 2.0**-13
 
 
+UNDER_LOAD = {"control": "load", "unload": True}
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -166,21 +169,14 @@ def test_steps_that_fail_are_halved_and_then_given_up(surface):
         # Unloading.
         ({"reduced_pressures": [0.1], "control": "force", "unload": True}, "^control: 'force' must be one of sep"),
         ({"reduced_pressures": [0.1], "control": "load"}, "^control: 'load'"),
-        *(
-            ({"reduced_pressures": [0.1], "turning_points": turns}, message)
-            for turns, message in (
-                ([("load", 0.01)], r"^turning_points\[0\]: kind 'load' must be one of"),
-                ([("reduced_pressure", 0.1)], r"^turning_points\[0\]: 0.1 .*0\.1"),
-                ([("reduced_pressure", 0.05), ("reduced_pressure", 0.04)], r"^turning_points\[1\]: 0.04"),
-            )
+        (
+            {"reduced_pressures": [0.1], "turning_points": [("load", 0.01)]},
+            r"^turning_points\[0\]: kind 'load' must be",
         ),
-        *(
-            (
-                {"reduced_pressures": [0.1], "control": "load", "unload": True, name: [("area_fraction", 0.05)]},
-                "^control: 'load'",
-            )
-            for name in ("turning_points", "snapshots")
-        ),
+        ({"forces": [0.1], "turning_points": [("force", 0.1)]}, r"^turning_points\[0\]: 0.1 .*0\.1"),
+        ({"forces": [0.1], "turning_points": [("force", 0.05), ("force", 0.04)]}, r"^turning_points\[1\]: 0.04"),
+        ({"reduced_pressures": [0.1], **UNDER_LOAD, "turning_points": [("area_fraction", 0.05)]}, "^control: 'load'"),
+        ({"reduced_pressures": [0.1], **UNDER_LOAD, "snapshots": [("area_fraction", 0.05)]}, "^control: 'load'"),
     ],
 )
 def test_bad_paths_are_refused_by_name(arguments, message):

@@ -163,47 +163,44 @@ def test_bad_lengths_and_slopes_are_refused_by_name(value):
         Surface(_with(0.0), 1.0).scaled_to_rms_slope(value)
 
 
+INNER, OUTER, CORNER = (0.9e-6, 0.0), (1.1e-6, 0.0), (0.8e-6, 0.8e-6)
 SMOOTH = [Sphere(1e-3), Paraboloid((1e-3, 1e-3)), Wave(1e-3, 2e-7, 3e-5), Wave(1e-3, -2e-7, 3e-5)]
 
 
 def test_points_of_a_sphere_have_the_distance_of_its_radius_from_the_centre():
     x, y = np.random.default_rng(1).uniform(-0.7, 0.7, (2, 100))
     np.testing.assert_allclose(np.sqrt(x**2 + y**2 + (Sphere(1.0).heights(x, y) + 1.0) ** 2), 1.0, rtol=1e-14)
-    # Close to the apex, rounding must not destroy the height.
-    assert Sphere(1e-3).heights(1e-12, 0.0) == pytest.approx(-(1e-12**2) / 2e-3, rel=1e-12)
-
-
-def test_points_beside_a_sphere_are_refused():
     with pytest.raises(ValueError, match=r"radius: 0\.001 m is less than the distance of 0\.00141421 m .* larger"):
         Sphere(1e-3).heights(np.array([0.0, 1e-3]), np.array([0.0, 1e-3]))
 
 
-def test_paraboloid_has_the_radii_of_curvature_along_its_axes():
-    shape = Paraboloid([2e-3, 5e-3])
-    assert shape.heights(1e-5, 0.0) == pytest.approx(-(1e-5**2) / (2 * 2e-3), rel=1e-14)
-    assert shape.heights(0.0, 1e-5) == pytest.approx(-(1e-5**2) / (2 * 5e-3), rel=1e-14)
-    assert shape.sphere_radius == pytest.approx(math.sqrt(10) * 1e-3, rel=1e-14)
+ELLIPSOID, CREST, TROUGH = Paraboloid([2e-3, 5e-3]), *SMOOTH[2:]
 
 
-def test_punches_exist_inside_their_edges_only():
-    x = np.array([0.0, 0.9, 1.1, 0.8]) * 1e-6
-    y = np.array([0.0, 0.0, 0.0, 0.8]) * 1e-6
-    assert list(CylinderPunch(1e-6).heights(x, y)) == [0, 0, -np.inf, -np.inf]
-    assert list(FlatPunch(2e-6).heights(x, y)) == [0, 0, -np.inf, 0]
+@pytest.mark.parametrize(
+    ("shape", "x", "y", "height"),
+    [
+        # Close to the apex, rounding must not destroy the height.
+        (Sphere(1e-3), 1e-12, 0.0, -(1e-12**2) / 2e-3),
+        (ELLIPSOID, 1e-5, 0.0, -(1e-5**2) / (2 * 2e-3)),
+        (ELLIPSOID, 0.0, 1e-5, -(1e-5**2) / (2 * 5e-3)),
+        (Cone(math.radians(45)), 3.0, 4.0, -5.0),
+        (Cone(math.radians(80)), 0.0, 1.0, -math.tan(math.radians(10))),
+        # Waves repeat below the paraboloid; at a negative amplitude, a trough lies in the centre.
+        (CREST, 6e-5, 0.0, -(6e-5**2) / 2e-3),
+        (CREST, 0.0, 1.5e-5, -(1.5e-5**2) / 2e-3 - 4e-7),
+        (TROUGH, 0.0, 1.5e-5, -(1.5e-5**2) / 2e-3 + 4e-7),
+        # Punches exist inside their edges only.
+        *((CylinderPunch(1e-6), *at, height) for at, height in ((INNER, 0), (OUTER, -np.inf), (CORNER, -np.inf))),
+        *((FlatPunch(2e-6), *at, height) for at, height in ((INNER, 0), (OUTER, -np.inf), (CORNER, 0))),
+    ],
+)
+def test_heights_of_shapes(shape, x, y, height):
+    assert shape.heights(x, y) == pytest.approx(height, rel=1e-12, abs=0)
 
 
-def test_cone_descends_by_the_cotangent_of_its_half_angle():
-    assert Cone(math.radians(45)).heights(3.0, 4.0) == pytest.approx(-5.0, rel=1e-14)
-    assert Cone(math.radians(80)).heights(0.0, 1.0) == pytest.approx(-math.tan(math.radians(10)), rel=1e-14)
-
-
-def test_waves_repeat_below_the_paraboloid_and_a_trough_lies_in_the_centre_if_the_amplitude_is_negative():
-    crest, trough = Wave(1e-3, 2e-7, 3e-5), Wave(1e-3, -2e-7, 3e-5)
-    paraboloid = Paraboloid((1e-3, 1e-3))
-    assert crest.heights(6e-5, 0.0) == pytest.approx(paraboloid.heights(6e-5, 0.0), rel=1e-12)
-    half = paraboloid.heights(0.0, 1.5e-5)
-    assert crest.heights(0.0, 1.5e-5) == pytest.approx(half - 4e-7, rel=1e-12)
-    assert trough.heights(0.0, 1.5e-5) == pytest.approx(half + 4e-7, rel=1e-12) and half + 4e-7 > 0
+def test_the_radius_of_an_ellipsoid_is_the_geometric_mean():
+    assert ELLIPSOID.sphere_radius == pytest.approx(math.sqrt(10) * 1e-3, rel=1e-14)
 
 
 @pytest.mark.parametrize("shape", [Sphere(1e-3), Cone(1.4), *SMOOTH[2:]])

@@ -119,14 +119,15 @@ def prepare(monkeypatch, tmp_path):
         prepare.locks.pop().close()
 
 
-STAMPS = {"results/tiny/run.nc": dict.fromkeys(NAMES, "new")}
+RESULT = "results/tiny/report.html"
+PATH, STAMP = "results/tiny/run.nc", dict.fromkeys(NAMES, "new")
 
 
 @pytest.mark.parametrize(
     ("arguments", "dry_run", "removed"),
     [
         ([], False, True),
-        (["all", "--cores", "2", "--report-after-run"], False, True),
+        (["all", "--cores", "2", "--report-after-run", "--configfile", "a/all.yaml", RESULT], False, True),
         ([], True, False),
         (["--touch"], False, False),
         (["--report", "page.html"], False, False),
@@ -137,25 +138,23 @@ STAMPS = {"results/tiny/run.nc": dict.fromkeys(NAMES, "new")}
 )
 def test_outdated_files_are_removed_if_jobs_will_run(arguments, dry_run, removed, prepare, monkeypatch):
     monkeypatch.setattr(sys, "argv", ["snakemake", *arguments])
-    for path, stamp in STAMPS.items():
-        Path(path).parent.mkdir(parents=True)
-        write_dataset(DATASET.assign_attrs(stamp), path)
-        results = "results/tiny", "tiny.yaml"
-        prepare.Results(*results, STAMPS, dry_run=dry_run)
-        assert Path(path).exists()
-        for lock in prepare.locks:
-            lock.close()
-        prepare.Results(*results, {path: stamp | {"config_sha256": "other"}}, dry_run=dry_run)
-        assert Path(path).exists() != removed
+    assert prepare.targets_of(sys.argv) == [each for each in arguments if each in ("all", RESULT)]
+    Path(PATH).parent.mkdir(parents=True)
+    write_dataset(DATASET.assign_attrs(STAMP), PATH)
+    prepare.Results("results/tiny", "tiny.yaml", {PATH: STAMP}, dry_run=dry_run)
+    assert Path(PATH).exists()
+    for lock in prepare.locks:
+        lock.close()
+    prepare.Results("results/tiny", "tiny.yaml", {PATH: STAMP | {"config_sha256": "other"}}, dry_run=dry_run)
+    assert Path(PATH).exists() != removed
 
 
 def test_another_licence_is_stated_without_computing(prepare):
-    for path, stamp in STAMPS.items():
-        Path(path).parent.mkdir(parents=True)
-        write_dataset(DATASET.assign_attrs(stamp), path)
-        prepare.Results("results/tiny", "tiny.yaml", {path: stamp | {"license": "CC0-1.0"}})
-        assert read_stamp(path) == stamp | {"license": "CC0-1.0"}
-        assert read_dataset(path).equals(DATASET)
+    Path(PATH).parent.mkdir(parents=True)
+    write_dataset(DATASET.assign_attrs(STAMP), PATH)
+    other = STAMP | {"license": "CC0-1.0"}
+    prepare.Results("results/tiny", "tiny.yaml", {PATH: other})
+    assert read_stamp(PATH) == other and read_dataset(PATH).equals(DATASET)
 
 
 def test_two_calls_at_once_and_temporary_files_of_killed_calls(prepare):
@@ -180,19 +179,11 @@ def test_results_of_another_configuration_of_the_same_name_are_refused(dry_run, 
         prepare.Results("results/tiny", "copy.yaml", {}, dry_run=dry_run)
 
 
-def test_targets_are_found_among_the_arguments_of_snakemake(prepare):
-    arguments = ["snakemake", "--cores", "2", "runs", "--configfile", "config/all.yaml", "results/tiny/report.html"]
-    assert prepare.targets_of(arguments) == ["runs", "results/tiny/report.html"]
-
-
 @pytest.mark.parametrize("link", [True, False])
-def test_a_file_or_a_broken_link_instead_of_the_results_is_named(link, prepare):
+def test_places_without_room_for_results_are_named(link, prepare, tmp_path, monkeypatch):
     Path("results").symlink_to("nowhere") if link else Path("results").write_text("something else")
     with pytest.raises(SystemExit, match="results/tiny cannot be written to: instead of a folder there is"):
         prepare.Results("results/tiny", "tiny.yaml", {}).begin()
-
-
-def test_a_folder_with_a_backslash_is_refused(prepare, tmp_path, monkeypatch):
     (tmp_path / "a\\b").mkdir()
     monkeypatch.chdir(tmp_path / "a\\b")
     with pytest.raises(SystemExit, match="has a backslash"):
