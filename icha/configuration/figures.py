@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from pydantic import ConfigDict, Field
 
-from icha.contact.models import DEFAULT_MODEL, MODELS, REFERENCE_MODEL, first_model
+from icha.contact.models import MODELS, REFERENCE_MODEL, first_model
 from icha.datasets import results
 from icha.datasets.labels import RunLabels
 from icha.path.snapshots import Snapshot
@@ -220,7 +220,7 @@ class MapFigure(SnapshotFigure, RunFigure):
 
     def _inputs(self, campaign, files):
         found, run = super()._inputs(campaign, files), self.run(campaign)
-        if run.model == DEFAULT_MODEL and REFERENCE_MODEL in campaign.studies[self.study].models:
+        if REFERENCE_MODEL in campaign.studies[self.study].models:
             found["truth"] = files.path(results.RUN, run._replace(model=REFERENCE_MODEL))
         return found
 

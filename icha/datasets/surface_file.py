@@ -99,13 +99,18 @@ def read_surface(path: str | os.PathLike) -> Surface:
         if name not in dataset:
             raise ValueError(f"{path}: not a surface file, because it has no variable {name!r}")
     try:
-        heights = dataset["height"].transpose("y", "x").values
-        shape = make_shape(json.loads(dataset.attrs["shape"])) if "shape" in dataset.attrs else None
-        shortest = float(dataset["short_wavelength"]) if "short_wavelength" in dataset else None
-        boundary = dataset.attrs.get("boundary", PERIODIC)
-        return Surface(heights, float(dataset["period"]), boundary, shape, shortest)
+        return surface_from(dataset)
     except (TypeError, ValueError) as error:
         raise ValueError(f"{path}: {error}") from None
+
+
+def surface_from(dataset: xr.Dataset) -> Surface:
+    """Return the topography in the dataset of a surface file, at the rms slope of the file."""
+    heights = dataset["height"].transpose("y", "x").values
+    shape = make_shape(json.loads(dataset.attrs["shape"])) if "shape" in dataset.attrs else None
+    shortest = float(dataset["short_wavelength"]) if "short_wavelength" in dataset else None
+    boundary = dataset.attrs.get("boundary", PERIODIC)
+    return Surface(heights, float(dataset["period"]), boundary, shape, shortest)
 
 
 def read_scaled_surface(path: str | os.PathLike, rms_slope: float, rms_height: float | None = None) -> Surface:

@@ -12,6 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from icha.analysis.model_error import contact_of_spots, jaccard, snapshot_if_any, state_of
 from icha.contact.model import EVENT_KINDS
+from icha.contact.models import REFERENCE_MODEL
 from icha.datasets.campaign import find_snapshot
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of
@@ -48,17 +49,23 @@ _RED = (0.9, 0.0, 0.05)
 # --- figure 4 ---
 
 # The surface is _ZOOM times as wide as the enlarged window. A window that is wider than _WIDEST_IN_RADII times the mean
-# radius of the spots is halved repeatedly, but not to fewer than _LEAST_CELLS cells along a side.
+# radius of the spots is halved repeatedly, but not to fewer than _LEAST_CELLS cells along a side. The width is at
+# least _LEAST_IN_RADII radii of the largest spot.
 _ZOOM = 4
+_LEAST_IN_RADII = 3
 _WIDEST_IN_RADII = 40
 _LEAST_CELLS = 64
 # Largest number of spots that are drawn as vector graphics. More spots become an image, so that PDF files stay small.
 _MANY_SPOTS = 2000
+# Look of the cells in contact, black on a map.
+_BLACK = {"cmap": LinearSegmentedColormap.from_list("contact", [(0, 0, 0, 0), (0, 0, 0, 1)]), "vmin": 0, "vmax": 1}
 # Names and colours of nodes: in contact in no model, only with asperities, only with boundary elements, in both models.
 _NODES = (("", "white"), ("asperities only", _RED), ("boundary elements only", "black"), ("both", "0.72"))
 
-_SPOTS = """Contact spots of the asperity model (red, in true size and position) on a map of the topography, whose
-mean height is zero. The title gives surface, material and load."""
+_SPOTS = """Contact spots of the asperity model (red, in true size and position) on a map of the topography. The title
+gives surface, material and load."""
+_CELLS = """Contact of boundary elements (black cells) on a map of the topography. The title gives surface, material and
+load. The table of the figure has the position of each patch, and the radius of a circle of its area."""
 _COMPARED = """Panel (b) shows the contact of boundary elements on the same topography at the same load (black). Panel
 (c) enlarges the framed region around the largest spot of (a): edges of contact of the asperity model (red) and of
 boundary elements (black), also of holes. Panel (d) shows where both models are in contact, and where only one is; the
@@ -78,10 +85,11 @@ def contact_map(
 ) -> Figure:
     """Draw the spots of one snapshot of one run.
 
-    `truth` is the same run with boundary elements, including contact maps; None without such a run.
+    `truth` is the same run with boundary elements, including contact maps; None without such a run. A run that is
+    itself with boundary elements is drawn alone.
     """
     labels = RunLabels(*run)
-    data = select.select_complete_run(campaign, labels)
+    data, alone = select.select_complete_run(campaign, labels), labels.model == REFERENCE_MODEL
     at = find_snapshot(data, kind, target)
     state, beside = state_of(data, at), None
     kind, target = str(data["snapshot_kind"].values[at]), float(data["snapshot_target"].values[at])
@@ -91,30 +99,41 @@ def contact_map(
     topography = topography_of(data, surface)
     circles = spot_circles(data, at, topography.length)
     corner, width = _view(circles, topography)
-    fig, panels = new_panels(*(3.35, 1) if beside is None else (6.9, 2))
-    say(fig, _SPOTS)
-    whole, enlarged = panels[0, 0], panels[0, 1] if beside is None else panels[1, 0]
-    heights = {"cmap": "cividis", "vmin": -topography.highest, "vmax": topography.highest}
+    compared = beside is not None and not alone
+    fig, panels = new_panels(*(6.9, 2) if compared else (3.35, 1))
+    say(fig, _CELLS if alone else _SPOTS)
+    whole, enlarged = panels[0, 0], panels[1, 0] if compared else panels[0, 1]
+    heights = {"cmap": "cividis", "vmin": topography.lowest, "vmax": topography.highest}
     image = topography.draw(whole, **heights)
-    draw_spots(whole, circles, facecolor=(*_RED, 0.85), lw=0, rasterized=len(circles) > _MANY_SPOTS)
     record_spots(whole, circles, topography.side, Name("spots", labels))
     nodes, borders = _window(topography.heights, topography.side, corner, width)
-    enlarged.imshow(nodes * topography.scale, extent=borders, origin="lower", interpolation="nearest", **heights)
-    colour = (*_RED, 0.4) if beside is None else "none"
-    draw_spots(enlarged, circles, facecolor=colour, edgecolor=_RED, lw=1.0)
-    area = rf"$A/A_0$ = {float(state['contact_area_fraction']):.3f}"
-    whole.set_title(area if beside is None else f"asperities, {area}", loc="right")
-    enlarged.set_title(f"enlarged ×{topography.side / width:.0f}", loc="right")
-    if beside is None:
-        say(fig, "Panel (b) enlarges the framed region around the largest spot.")
+    look = {"extent": borders, "origin": "lower", "interpolation": "nearest"}
+    enlarged.imshow(nodes * topography.scale, **look, **heights)
+    if alone:
+        fraction = beside["contact_map"].transpose("row", "column").values.astype(float)
+        draw_map(whole, fraction, topography.side, **_BLACK)
+        nodes, borders = _window(fraction, topography.side, corner, width)
+        enlarged.imshow(nodes, **look | {"extent": borders}, **_BLACK)
     else:
+        draw_spots(whole, circles, facecolor=(*_RED, 0.85), lw=0, rasterized=len(circles) > _MANY_SPOTS)
+        draw_spots(enlarged, circles, facecolor="none" if compared else (*_RED, 0.4), edgecolor=_RED, lw=1.0)
+    area = rf"$A/A_0$ = {float(state['contact_area_fraction']):.3f}"
+    whole.set_title(f"asperities, {area}" if compared else area, loc="right")
+    enlarged.set_title(f"enlarged ×{topography.side / width:.2g}", loc="right")
+    if not compared:
+        say(fig, "Panel (b) enlarges the framed region around the largest spot.")
+    if alone:
+        say(fig, range_of_attraction(attractions_of([truth])))
+    if compared:
         say(fig, _COMPARED, range_of_attraction(attractions_of([truth])))
         covered = contact_of_spots(data, at, len(beside["contact_map"]))
         _draw_boundary_elements(panels, topography, (corner, width), heights, beside, covered)
     if str(data["boundary"].values) == "periodic":
-        say(fig, "The map is one period; circles continue across its borders.")
+        say(fig, "The map is one period; spots continue across its borders. The mean height is zero.")
+    elif select.has_shape(data):
+        say(fig, "The heights are those of the shape with its roughness.")
     load = rf"$F/(E^{{\ast}}h′_{{\mathrm{{rms}}}}A_0)$ = {format_number(float(state['reduced_pressure']))}"
-    title = f"{run_label(campaign, labels)}, {load}"
+    title = f"{run_label(campaign, labels)}, {_name_force(state) or load}"
     fig.suptitle(f"{title}\n{select.doubt_about(data)}".rstrip(), fontsize="medium")
     for ax in panels.ravel():
         topography.label(ax)
@@ -137,8 +156,8 @@ def _view(circles, topography):
         zoom *= 2
     largest = np.argmax(radius) if len(radius) else None
     middle = np.array([side, side]) / 2 if largest is None else np.array([x[largest], y[largest]])
-    corner = np.clip(middle - side / zoom / 2, 0, side - side / zoom)
-    return corner, side / zoom
+    width = min(max(side / zoom, _LEAST_IN_RADII * float(radius.max(initial=0))), side)
+    return np.clip(middle - width / 2, 0, side - width), width
 
 
 def _draw_boundary_elements(panels, topography, window, heights, beside, covered):
@@ -147,8 +166,7 @@ def _draw_boundary_elements(panels, topography, window, heights, beside, covered
     fraction = beside["contact_map"].transpose("row", "column").values.astype(float)
     contact = fraction >= 0.5
     topography.draw(solution, **heights)
-    black = LinearSegmentedColormap.from_list("contact", [(0, 0, 0, 0), (0, 0, 0, 1)])
-    draw_map(solution, fraction, topography.side, cmap=black, vmin=0, vmax=1)
+    draw_map(solution, fraction, topography.side, **_BLACK)
     nodes, borders = _window(fraction, topography.side, *window)
     enlarged.contour(nodes, [0.5], extent=borders, origin="lower", colors="black", linewidths=0.9)
     enlarged.legend(
@@ -285,7 +303,7 @@ def snap_map(campaign: xr.DataTree, surface: xr.Dataset, *, run: Sequence) -> Fi
 def _draw_places(ax, topography, events):
     """Draw events over the topography; return the legend entries by name."""
     # The map is light, so that the marks are visible.
-    image = topography.draw(ax, cmap="gray", vmin=-2.2 * topography.highest, vmax=topography.highest)
+    image = topography.draw(ax, cmap="gray", vmin=2.2 * topography.lowest, vmax=topography.highest)
     topography.label(ax)
     marks = {name: (events["kind"] == name) & (events["branch"] == branch) for name, (_, branch, _) in _KINDS.items()}
     most = max(np.count_nonzero(shown) for shown in marks.values())
@@ -301,7 +319,7 @@ def _draw_places(ax, topography, events):
             handles[f"{words} ({np.count_nonzero(shown)})"] = points
     bar = ax.figure.colorbar(image, ax=ax, shrink=0.9, pad=0.02, aspect=28)
     bar.set_label(f"height ({topography.height_unit})")
-    bar.ax.set_ylim(-topography.highest, topography.highest)
+    bar.ax.set_ylim(topography.lowest, topography.highest)
     return handles
 
 
@@ -418,10 +436,17 @@ def _branch(maps, snapshot):
 def _name_state(maps, snapshot):
     """Return load and area of a snapshot as text, with the branch if it is not loading; on a free square, the force."""
     step, name = int(maps["snapshot_step"].values[snapshot]), _branch(maps, snapshot)
-    if "force" in maps:
-        force = format_quantity(float(f"{float(maps['force'][step]):.3g}"), "N").replace("-", "−")
-        return f"{name}, $F$ = {force}"
+    if force := _name_force(maps.isel(step=step)):
+        return f"{name}, {force}"
     load = format_number(float(f"{float(maps['reduced_pressure'][step]):.3g}"))
     area = format_number(float(f"{float(maps['contact_area_fraction'][step]):.2g}"))
     words = rf"$p^{{\ast}}$ = {load}" + f"\n$A/A_0$ = {area}"
     return words if name == "loading" else f"{name}, {words}"
+
+
+def _name_force(state):
+    """Return the force of a state on a free square as text; "" on a periodic surface, where a pressure is stated."""
+    if "force" not in state:
+        return ""
+    force = float(f"{float(state['force']):.3g}")
+    return f"$F$ = {format_quantity(force, 'N')}".replace("-", "−")

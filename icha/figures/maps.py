@@ -9,6 +9,7 @@ from matplotlib.collections import EllipseCollection
 from matplotlib.image import AxesImage
 
 from icha.datasets.campaign import spots_of
+from icha.datasets.surface_file import surface_from
 from icha.figures.drawn import Name, record
 from icha.support.formatting import choose_unit
 
@@ -19,13 +20,13 @@ _FLAT = 1e-9
 
 
 class Topography(NamedTuple):
-    """Heights of the topography of a run, with the units of the axes.
+    """Heights of the topography of a run, with its shape, if any, and the units of the axes.
 
     Attributes
     ----------
-    heights : (n, n) float along y and x, heights in the surface file.
+    heights : (n, n) float along y and x, heights in the surface file, or of shape and roughness; NaN beside the shape.
     scale : factor that converts `heights` to the heights of the run in `height_unit`.
-    highest : largest magnitude of the heights of the run, in `height_unit`.
+    lowest, highest : ends of the scale of heights, in `height_unit`; without a shape, 0 is in the middle.
     height_unit : unit of the heights.
     side : side of the surface in `length_unit`.
     length : factor that converts metres to `length_unit`.
@@ -34,6 +35,7 @@ class Topography(NamedTuple):
 
     heights: np.ndarray
     scale: float
+    lowest: float
     highest: float
     height_unit: str
     side: float
@@ -55,12 +57,20 @@ def topography_of(run: xr.Dataset, surface: xr.Dataset) -> Topography:
     """Return the topography of a run from the dataset of its surface file."""
     heights = surface["height"].transpose("y", "x").values
     factor = float(run["rms_height"]) / (float(surface["rms_height"]) or 1.0)
+    if "shape" in surface.attrs:
+        whole = surface_from(surface)
+        heights, factor = whole.profile + (factor - 1) * whole.heights, 1.0
+        heights = np.where(np.isfinite(heights), heights, np.nan)
     # The array may be large, so no copy is made.
-    highest = max(float(heights.max()), -float(heights.min())) * factor or _FLAT
+    lowest, highest = float(np.nanmin(heights)) * factor, float(np.nanmax(heights)) * factor
+    largest = max(highest, -lowest) or _FLAT
+    if "shape" not in surface.attrs or lowest == highest:
+        lowest, highest = -largest, largest
     period = float(run["period"])
     length, length_unit = choose_unit(period, "m")
-    height, height_unit = choose_unit(highest, "m")
-    return Topography(heights, factor * height, highest * height, height_unit, period * length, length, length_unit)
+    height, height_unit = choose_unit(largest, "m")
+    scales = factor * height, lowest * height, highest * height
+    return Topography(heights, *scales, height_unit, period * length, length, length_unit)
 
 
 def draw_map(axes: Axes, nodes: np.ndarray, side: float, scale: float = 1.0, **look) -> AxesImage:

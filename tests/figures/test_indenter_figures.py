@@ -11,9 +11,10 @@ import icha
 from icha.asperity.tabor import SHORT_RANGE_FROM
 from icha.cli import app
 from icha.datasets.campaign_file import campaign_tree
-from icha.datasets.files import write_dataset
+from icha.datasets.files import read_dataset, write_dataset
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of
+from icha.datasets.surface_file import write_surface
 from icha.figures import against_load, at_one_load, contact_maps, indenters, loops, select
 from icha.figures.captions import units_of_shapes
 from icha.figures.drawn import caption_of, table_of
@@ -239,6 +240,26 @@ def test_maps_show_the_pressure_at_every_snapshot():
         cells = drawn[drawn.panel == "ab"[k]]
         assert cells.pressure.sum() * (SIDE / GRID) ** 2 == pytest.approx(force, rel=1e-4)
         assert cells.x.mean() == pytest.approx(cells.y.mean()) and len(cells) == shown.count()
+
+
+def test_fig4_draws_the_cells_of_boundary_elements_on_the_shape(tmp_path):
+    run = press()
+    write_surface(
+        tmp_path / "s.nc", icha.Surface(np.zeros((GRID, GRID)), SIDE, "free", Sphere(RADIUS)), name="s", seed=0
+    )
+    labels = ("press", "boundary_elements", "s0", 0, 0.1, "soft")
+    fig = contact_maps.contact_map(tree_of(run), read_dataset(tmp_path / "s.nc"), run, run=labels, kind="indentation")
+    heights, cells = (image.get_array()[:-1, :-1] for image in fig.axes[0].get_images())
+    np.testing.assert_array_equal(cells, run["contact_map"].values[0])
+    assert heights.min() == pytest.approx(-(SIDE**2) / 4 / RADIUS * 1e9, rel=0.1) and heights.max() == pytest.approx(
+        0, abs=1
+    )
+    assert "Contact of boundary elements" in caption_of(fig) and "asperity" not in caption_of(fig)
+    assert "$F$ = " in fig.get_suptitle() and "mathrm{rms}}A_0" not in fig.get_suptitle()
+    # The frame contains the contact.
+    columns = np.flatnonzero(cells.any(axis=0)) / GRID * SIDE * 1e6
+    left, right = fig.axes[1].get_xlim()
+    assert left < columns[0] and columns[-1] < right
 
 
 def test_reasons_for_an_empty_figure():
