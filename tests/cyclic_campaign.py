@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import small_campaign as small
+import xarray as xr
 
 import icha
 from icha.datasets.campaign_file import campaign_tree
@@ -110,6 +111,21 @@ def unloaded(run, between=0):
 @cache
 def run(seed=1, material="soft", between=0):
     return unloaded(small.run(seed=seed, material=material), between)
+
+
+PULL = RunLabels("pull", "boundary_elements", "rough", 1, 1.0, "soft")
+
+
+def pulls(seeds, change=lambda seed, run: run):
+    """Return labels and runs of loops as by boundary elements, each changed by a function of its seed."""
+    tension = xr.Variable((), 1.0, {"units": "Pa", "long_name": "test"})
+    return [
+        (
+            PULL._replace(seed=seed),
+            change(seed, run(seed).assign(resolved_tension=tension).assign_attrs(contact_model=PULL.model)),
+        )
+        for seed in seeds
+    ]
 
 
 @cache

@@ -360,13 +360,17 @@ def test_a_campaign_too_large_for_the_machine_causes_a_warning(tiny, small_machi
     assert "Warning" not in output("run", "tiny.yaml", "--profile", "slurm", status=STARTED)
 
 
-def test_all_files_are_checked_and_runs_are_shown(empty_folder):
+def test_files_are_checked_and_shown(empty_folder):
     run = small.run()
     write_dataset(run, "run.nc")
     write_dataset(run.assign_attrs(incomplete="the path ends early"), "failed.nc")
     Path("bad.npy").write_bytes(b"")
     assert "run dataset, no problems" in output("check", "run.nc")
     assert "reduced pressure p*" in output("show", "run.nc")
+    write_surface("surface.nc", small.surface(), name="rough", seed=1, spectrum=small.SPECTRUM)
+    write_dataset(small.tree(), "campaign.nc")
+    assert re.search(r"hurst +0.8 +Hurst exponent H", output("show", "surface.nc"))
+    assert "slopes: 1 model, 1 surface, 1 seed, 2 rms_slope, 2 material" in output("show", "campaign.nc")
     assert "failed: the path ends early" in output("show", "failed.nc")
     assert "failed.nc: run dataset, 1 problem" in output("check", "run.nc", "failed.nc", status=1)
     checked = output("check", "bad.npy", "none.nc", "failed.nc", "run.nc", status=2)
@@ -374,16 +378,12 @@ def test_all_files_are_checked_and_runs_are_shown(empty_folder):
         assert words in checked
 
 
-def test_surfaces_and_campaigns_are_shown(empty_folder):
-    write_surface("surface.nc", small.surface(), name="rough", seed=1, spectrum=small.SPECTRUM)
-    write_dataset(small.tree(), "campaign.nc")
-    assert re.search(r"hurst +0.8 +Hurst exponent H", output("show", "surface.nc"))
-    assert "slopes: 1 model, 1 surface, 1 seed, 2 rms_slope, 2 material" in output("show", "campaign.nc")
+# A figure and a finished run, which exist.
+KEPT = {"0": "figures", "kept": "runs"}
 
 
 @pytest.fixture
 def clock(monkeypatch):
-    """Clock of the progress."""
     clock = SimpleNamespace(now=0.0, time=lambda: clock.now)
     monkeypatch.setattr("icha.cli.progress.time", clock)
     return clock
@@ -391,15 +391,12 @@ def clock(monkeypatch):
 
 @pytest.fixture
 def progress(tmp_path, clock):
-    """Progress of three runs and a figure of 10 s on two cores, and of a finished run; run and figure exist."""
+    """Progress of three runs and a figure of 10 s on two cores, and of a finished run."""
     items = [Item("runs", "study", f"{k}.nc", TO_DO if k else DONE, "", Cost(10.0, 0, 0)) for k in range(1, 4)]
     items += [Item(part, part, f"{name}.nc", DONE, "", Cost(10.0, 0, 0)) for name, part in KEPT.items()]
     for name in KEPT:
         (tmp_path / f"{name}.nc").touch()
     return Progress(items, tmp_path, 2)
-
-
-KEPT = {"0": "figures", "kept": "runs"}
 
 
 def test_finished_files_are_counted(progress, tmp_path):

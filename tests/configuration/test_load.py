@@ -48,6 +48,10 @@ def test_overrides_are_part_of_the_configuration_as_used(load, tmp_path):
     assert load_configuration(again) == configuration
 
 
+ALIASES = "a0: &a0 [x, x]\n" + "".join(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]\n" for i in range(1, 20))
+MERGED = "a0: &a0 {k: 1}\n" + "".join(f"a{i}: &a{i} {{<<: [{', '.join([f'*a{i - 1}'] * 10)}]}}\n" for i in range(1, 20))
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [
@@ -57,7 +61,14 @@ def test_overrides_are_part_of_the_configuration_as_used(load, tmp_path):
         ("a: 1\ntitle: Gerät\n".encode("latin-1"), "line 2: is not UTF-8"),
         (b"a: 1\nb: \x07\n", "line 2: control character 0x07; expected a YAML mapping"),
         (b"a: !!python/object:os.system {}\n", "expected a YAML mapping"),
+        # Texts that would never end.
+        (ALIASES.encode(), "the file has more than 1000000 values, with aliases and defaults expanded; expected "),
+        (MERGED.encode(), "the key <<; write values that several entries share.*; expected "),
+        (b"studies: {one: {vary: {hurst: &a [*a]}}}", "more than 50 nested sections or lists; expected "),
+        (b"a: " + b"{a: " * 5000, "more than 50 nested sections or lists; expected "),
+        (b"a: " + b"x" * 10**6, "is longer than 1 MB; expected "),
     ],
+    ids=range(11),
 )
 def test_files_that_are_not_configurations(content, message, tmp_path):
     file = tmp_path / "campaign.yaml"

@@ -101,8 +101,15 @@ def test_a_force_on_a_mirrored_scan_is_refused(load, refused):
     assert "four copies of the scan" in warning
 
 
-def test_an_unusual_slope_of_a_spectrum_names_its_unit_of_length(refused, tmp_path):
+def test_an_unusual_slope_of_a_topography_names_its_unit_of_length(load, refused, tmp_path):
     (tmp_path / "table.txt").write_text("1e5 1e-10\n1e6 1e-13\n")
     spectrum = {"kind": "spectrum", "path": "table.txt", "period": "100 um", "grid": 128}
     changes = {"surfaces.rough": spectrum, "studies.one.rms_slopes": "measured"}
     refused("", changes, "add `confirmed: [surfaces.rough.length_unit]`")
+    changes["surfaces.rough"] = measured_surface(height_unit="um")
+    key = "surfaces.rough.height_unit"
+    refused(
+        "", changes, f"{key}: 'rms slope 146' is unusual (the slope depends on units, size and numbers for missing po"
+    )
+    (warning,) = load(changes | {"confirmed": [key]}).warnings
+    assert f"{key}: 'rms slope 146' is unusual" in warning and "but confirmed; expected 1e-4 to 5" in warning

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from demo_configuration import file_surface, measured_surface
+from demo_configuration import file_surface
 
 from icha.configuration.cases import surface_cases, surface_settings
 from icha.configuration.errors import ConfigurationError
@@ -89,15 +89,3 @@ def test_section_in_si_units():
     assert Preparation(**how).missing == "refuse"
     assert MeasuredSurface.model_validate(SECTION | {"boundary": "periodic"}).preparation["detrend"] == "none"
     assert MeasuredSurface.model_validate(SECTION | {"boundary": "window"}).preparation["taper"] == 0.1
-
-
-def test_slopes_that_no_surface_has_are_to_be_confirmed(load, refused):
-    changes = {"surfaces.rough": measured_surface(height_unit="um"), "studies.one.rms_slopes": "measured"}
-    key = "surfaces.rough.height_unit"
-    refused(
-        "",
-        changes,
-        f"{key}: 'rms slope 146' is unusual (the slope depends on units, size and numbers for missing points); ",
-    )
-    (warning,) = load(changes | {"confirmed": [key]}).warnings
-    assert f"{key}: 'rms slope 146' is unusual" in warning and "but confirmed; expected 1e-4 to 5" in warning

@@ -14,26 +14,6 @@ from icha.configuration.load import load_configuration
 from icha.configuration.yaml_files import read_yaml
 from icha.planning.plan import plan
 
-ALIASES = "a0: &a0 [x, x]\n" + "".join(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]\n" for i in range(1, 20))
-MERGED = "a0: &a0 {k: 1}\n" + "".join(f"a{i}: &a{i} {{<<: [{', '.join([f'*a{i - 1}'] * 10)}]}}\n" for i in range(1, 20))
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (ALIASES, "the file has more than 1000000 values, with aliases and defaults expanded"),
-        (MERGED, "the key <<; write values that several entries share"),
-        ("studies: {one: {vary: {hurst: &a [*a]}}}", "more than 50 nested sections or lists"),
-        ("a: " + "{a: " * 5000, "more than 50 nested sections or lists"),
-        ("a: " + "x" * 10**6, "is longer than 1 MB"),
-    ],
-)
-def test_texts_that_would_never_end(text, message, tmp_path):
-    (tmp_path / "campaign.yaml").write_text(text)
-    with pytest.raises(ConfigurationError, match=r"campaign\.yaml.*; expected ") as error:
-        load_configuration(tmp_path / "campaign.yaml")
-    assert message in str(error.value)
-
 
 def test_thousands_of_cases_are_read_and_aliases_count_as_what_they_stand_for(tmp_path):
     (tmp_path / "one.yaml").write_text("a: [" + "1, " * 20_000 + "]")
@@ -84,36 +64,27 @@ def test_pipes_and_devices_are_not_opened(tmp_path, refused):
         refused("figures", {"mine": {"study": "one", "script": path}}, f"figures.mine.script: '{path}' {other}")
 
 
+STOPS = {"reduced_pressures": [1e-3 + 1e-6 * i for i in range(2000)]}
 WRONG = {
-    "unit of 100 kB": ("surfaces.rough.period", "1 " + "m" * 100_000, "is not a number with a unit; expected "),
-    "far beyond decimals": ("materials.soft.contact_modulus", f"1e{'9' * 50} MPa", "is not finite; expected "),
+    "unit of 100 kB": ({"surfaces.rough.period": "1 " + "m" * 100_000}, "is not a number with a unit; expected "),
+    "far beyond decimals": ({"materials.soft.contact_modulus": f"1e{'9' * 50} MPa"}, "is not finite; expected "),
     "cases times seeds": (
-        {
-            "studies.one.cases": [{"surface": "rough", "material": "soft"}] * 100,
-            "studies.one.seeds": "1..30000",
-        },
-        None,
+        {"studies.one.cases": [{"surface": "rough", "material": "soft"}] * 100, "studies.one.seeds": "1..30000"},
         "studies: defines 6000000 runs; expected at most 100000",
     ),
     "stops of all runs": (
-        {
-            "studies.one.seeds": "1..20000",
-            "studies.one.targets": {"reduced_pressures": [1e-3 + 1e-6 * i for i in range(1000)]},
-        },
-        None,
-        "studies: defines 40040000 targets of all runs; expected at most 5000000",
+        {"studies.one.seeds": "1..20000", "studies.one.targets": STOPS},
+        "studies: defines 80040000 targets of all runs; expected at most 5000000",
     ),
     "defaults of all studies": (
         {
-            "defaults": {"studies": {"targets": {"reduced_pressures": [1e-3 + 1e-6 * i for i in range(2000)]}}},
+            "defaults": {"studies": {"targets": STOPS}},
             "studies": {f"s{i}": {"surfaces": ["rough"]} for i in range(1000)},
         },
-        None,
         "the file has more than 1000000 values, with aliases and defaults expanded; expected fewer",
     ),
     "grid": (
         {"surfaces.rough": measured_surface(grid=32768), "studies.one.seeds": [1]},
-        None,
         "surfaces.rough.grid: 32768 gives a surface of 32768 x 32768 points, which needs about 25.8 GB of memory",
     ),
 }
@@ -121,8 +92,7 @@ WRONG = {
 
 @pytest.mark.parametrize("case", WRONG)
 def test_values_that_would_take_too_long_or_fail_late(case, refused):
-    key, value, message = WRONG[case]
-    refused(None if value is None else key, key if value is None else value, message)
+    refused("", *WRONG[case])
 
 
 def test_of_a_thousand_problems_the_first_are_reported(load):

@@ -32,27 +32,19 @@ def test_the_same_values_give_the_same_bytes(tmp_path, what):
         xr.testing.assert_identical(read_run(tmp_path / "one.nc"), small.run())
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-def test_values_not_finite_are_refused_by_name_and_leave_no_file(tmp_path, bad):
-    with pytest.raises(ValueError, match=r"x\.nc.*'length'.*1 of 2.*n=1"):
-        write_dataset(simple((1.0, bad)), tmp_path / "x.nc")
-    with pytest.raises(ValueError, match="'bare' has no units"):
-        write_dataset(xr.Dataset({"bare": ("n", [1.0])}), tmp_path / "x.nc")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_failed_write_leaves_the_old_file(tmp_path):
-    path = tmp_path / "x.nc"
+def test_a_refused_write_names_the_variable_and_leaves_the_old_file(tmp_path):
+    path, unwritable = tmp_path / "x.nc", simple()
     write_dataset(simple(), path)
     before = path.read_bytes()
-    with pytest.raises(ValueError):
-        write_dataset(simple((np.nan, 1.0)), path)
-    unwritable = simple()
+    for bad in (np.nan, np.inf, -np.inf):
+        with pytest.raises(ValueError, match=r"x\.nc.*'length'.*1 of 2.*n=1"):
+            write_dataset(simple((1.0, bad)), path)
+    with pytest.raises(ValueError, match="'bare' has no units"):
+        write_dataset(xr.Dataset({"bare": ("n", [1.0])}), path)
     unwritable.attrs["object"] = {"netCDF": "has no dictionaries"}
     with pytest.raises(TypeError):
         write_dataset(unwritable, path)
-    assert path.read_bytes() == before
-    assert list(tmp_path.iterdir()) == [path]
+    assert path.read_bytes() == before and list(tmp_path.iterdir()) == [path]
 
 
 def test_surface_round_trip_keeps_heights_and_axes(tmp_path):
@@ -118,20 +110,36 @@ def test_runs_may_come_as_files_in_any_order(tmp_path):
     assert len({(tmp_path / name).read_bytes() for name in ("one.nc", "two.nc", "three.nc")}) == 1
 
 
-def test_runs_that_cannot_be_in_a_campaign_are_refused_by_their_files(tmp_path):
-    labels, run = small.runs()[0]
-    write_dataset(run, tmp_path / "damaged.nc")
-    whole = (tmp_path / "damaged.nc").read_bytes()
-    for content in (b"nonsense", b"", whole[: len(whole) // 2]):
-        (tmp_path / "damaged.nc").write_bytes(content)
-        with pytest.raises(ValueError, match=r"damaged\.nc: "):
-            campaign_tree([(labels, run), (labels._replace(seed=2), tmp_path / "damaged.nc")])
+def other(pair, name):
+    """A run whose values of one variable are others."""
+    return pair[0], pair[1].assign({name: pair[1][name] * 1.001})
+
+
+def test_runs_that_cannot_be_in_a_campaign_are_refused_by_name(tmp_path):
+    slopes, single = ([pair for pair in small.runs() if pair[0].study == study] for study in ("slopes", "single"))
+    labels, run = slopes[0]
+    write_dataset(run, tmp_path / "run.nc")
+    whole = (tmp_path / "run.nc").read_bytes()
+    for name, content in (("cut.nc", whole[: len(whole) // 2]), ("text.nc", b"nonsense"), ("empty.nc", b"")):
+        (tmp_path / name).write_bytes(content)
     write_dataset(simple(), tmp_path / "other.nc")
-    with pytest.raises(ValueError, match=r"other\.nc: not a run dataset"):
-        campaign_tree([(labels, tmp_path / "other.nc")])
+    second = labels._replace(seed=2)
     odd = run.assign(contact_modulus=run["contact_modulus"] * 2, seed=run["seed"] + 1)
-    with pytest.raises(ValueError, match="contact_modulus differs"):
-        campaign_tree([(labels, run), (labels._replace(seed=2), odd)])
+    for runs, design, message in (
+        ([(labels, run), (second, tmp_path / "cut.nc")], None, r"cut\.nc: not a readable"),
+        ([(labels, run), (second, tmp_path / "text.nc")], None, r"text\.nc: not a readable"),
+        ([(labels, run), (second, tmp_path / "empty.nc")], None, r"empty\.nc: "),
+        ([(labels, tmp_path / "other.nc")], None, r"other\.nc: not a run dataset"),
+        ([(labels, run), (second, odd)], None, "contact_modulus differs"),
+        ([(labels, run)], [labels._replace(study="single")], r"slopes/.*/soft: this run is not in the design"),
+        ([(labels, run)], [labels._replace(material="hertz")], r"slopes/.*/soft: this run is not in the design"),
+        ([(labels, run), (labels, run)], None, "given twice"),
+        # The materials share the gaps' bins, the seeds the pressures'.
+        ([slopes[0], other(slopes[1], "gap_bin_edges")], None, "gap_bin_edges differs between runs that share"),
+        ([single[0], other(single[1], "pressure_bin_edges")], None, "pressure_bin_edges differs between runs"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            campaign_tree(runs, design=design)
 
 
 def test_a_run_that_ends_early_keeps_its_spots_where_others_meet_their_snapshots_in_another_order(tmp_path):
@@ -226,24 +234,3 @@ def test_a_run_that_broke_off_on_its_way_back_has_no_pull_off(tmp_path):
         np.testing.assert_array_equal(taken["work"].values, short["work"].values)
         whole = list(runs)[1]
         same(select_run(tree, whole).drop_vars("rms_slope"), runs[whole].drop_vars("rms_slope"), whole)
-
-
-def other(pair, name):
-    """A run whose values of one variable are others."""
-    return pair[0], pair[1].assign({name: pair[1][name] * 1.001})
-
-
-def test_runs_that_do_not_fit_are_refused_by_name():
-    slopes, single = ([pair for pair in small.runs() if pair[0].study == study] for study in ("slopes", "single"))
-    (labels, run), *_ = slopes
-    asked = [labels._replace(study="single")]
-    for runs, design, message in (
-        ([(labels, run)], asked, r"slopes/.*/soft: this run is not in the design"),
-        ([(labels, run)], [labels._replace(material="hertz")], r"slopes/.*/soft: this run is not in the design"),
-        ([(labels, run), (labels, run)], None, "given twice"),
-        # The materials share the gaps' bins, the seeds the pressures'.
-        ([slopes[0], other(slopes[1], "gap_bin_edges")], None, "gap_bin_edges differs between runs that share"),
-        ([single[0], other(single[1], "pressure_bin_edges")], None, "pressure_bin_edges differs between runs"),
-    ):
-        with pytest.raises(ValueError, match=message):
-            campaign_tree(runs, design=design)

@@ -37,19 +37,12 @@ def test_statements_are_the_same_everywhere(publication):
         assert all(value not in (None, "", [], {}) for value in content.values())
 
 
-def test_people_and_institutions_have_their_identifiers():
-    person, team, _ = yaml.safe_load(citation_cff(ALL, COMMIT))["authors"]
+def test_people_institutions_related_works_and_funding():
+    zenodo, (person, team, _) = zenodo_metadata(ALL), yaml.safe_load(citation_cff(ALL, COMMIT))["authors"]
     assert person["orcid"] == f"https://orcid.org/{ORCID}" and "affiliation" in person
     assert team == {"name": "California Digital Library", "website": "https://ror.org/03yrm5c26"}
-    assert zenodo_metadata(ALL)["creators"][0] == {
-        "name": "Carberry, Josiah",
-        "affiliation": "California Digital Library",
-        "orcid": ORCID,
-    }
-
-
-def test_related_works_and_funding():
-    zenodo = zenodo_metadata(ALL)
+    creator = {"name": "Carberry, Josiah", "affiliation": "California Digital Library", "orcid": ORCID}
+    assert zenodo["creators"][0] == creator
     assert zenodo["related_identifiers"][0] == {
         "identifier": "10.1007/s11249-017-0900-2",
         "relation": "isSupplementTo",

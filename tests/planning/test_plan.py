@@ -63,19 +63,15 @@ def test_the_summits_of_a_measured_surface_are_counted_in_its_file(campaign):
 
 
 def test_every_file_that_costs_something_is_planned(campaign, tmp_path):
-    planned = {item.path for item in plan(campaign, tmp_path)}
-    files = campaign_files(campaign)
+    planned, files = {item.path: item for item in plan(campaign, tmp_path)}, campaign_files(campaign)
     # The other files of a figure come from the job of its PNG; a verdict is one line.
     without_cost = {files.verdict, *(path for path in files.figures if not path.endswith(".png"))}
-    assert planned == set(files.computed) - without_cost
-
-
-def test_files_share_the_start_of_their_job(campaign, tmp_path):
-    items, files = {item.path: item for item in plan(campaign, tmp_path)}, campaign_files(campaign)
-    run = items[next(iter(files.runs))]
+    assert planned.keys() == set(files.computed) - without_cost
+    # Files share the start of their job.
+    run = planned[next(iter(files.runs))]
     assert run.work == pytest.approx(run.cost.seconds * (1 + JOB / BATCH))
     analysed = [files.dataset, files.table, files.comparison, files.checks]
-    assert sum(items[path].start for path in analysed) == pytest.approx(1)
+    assert sum(planned[path].start for path in analysed) == pytest.approx(1)
 
 
 def test_targets_need_a_part_of_the_files(campaign, tmp_path):
@@ -83,15 +79,11 @@ def test_targets_need_a_part_of_the_files(campaign, tmp_path):
     assert {item.path for item in needed_for(["runs", "--forceall"], items)} == {*files.surfaces, *files.runs}
     assert files.dataset in {item.path for item in needed_for(["dataset"], items)}
     assert [item.path for item in needed_for([f"results/demo/{files.report}"], items)] == [files.report]
-    assert needed_for([], items) == needed_for(["--forceall"], items) == needed_for(["runs", "all"], items) == items
-
-
-def test_targets_need_a_part_of_the_surfaces_runs_and_theories(campaign):
-    files = campaign_files(campaign)
     assert needed_files(files, ["surfaces"]) == {*files.surfaces}
     assert needed_files(files, ["references", "runs"]) == {*files.surfaces, *files.runs, *files.theories}
     for targets in ([], ["all"], ["surfaces", files.report]):
         assert needed_files(files, targets) == {*files.surfaces, *files.runs, *files.theories}
+    assert needed_for([], items) == needed_for(["--forceall"], items) == needed_for(["runs", "all"], items) == items
 
 
 def test_new_seeds_at_the_end_change_only_the_last_batch(read):

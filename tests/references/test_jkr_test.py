@@ -91,6 +91,13 @@ def test_units_of_headings_and_options(headings, factors, delimiter, options, tm
         np.testing.assert_allclose(found[name], each, rtol=1e-8)
 
 
+def test_a_column_of_the_branch_replaces_the_order():
+    order = np.random.default_rng(2).permutation(40)
+    table = {name: EXACT[name][order] for name in ("force", "contact_radius")}
+    table["branch"] = np.where(order < 20, "loading", "Retraction")
+    np.testing.assert_allclose(values(icha.fit_jkr_test(table, RADIUS)), list(TRUTH.values()), rtol=1e-3)
+
+
 def test_points_without_contact_are_left_out_and_counted():
     """An instrument records noise around zero before the jump-in and after pull-off."""
     rng = np.random.default_rng(3)
@@ -191,8 +198,7 @@ def test_a_sorted_table_has_lost_the_order_of_the_test():
         mixed = {quantity: each[places] for quantity, each in table.items()}
         with pytest.raises(ValueError, match=f"is sorted by {name}, so neighbouring points jump"):
             icha.fit_jkr_test(mixed, RADIUS)
-    mixed["branch"] = np.where(branch[places] == "unloading", "Retraction", "loading")
-    test = icha.fit_jkr_test(mixed, RADIUS)
+    test = icha.fit_jkr_test(mixed | {"branch": branch[places]}, RADIUS)
     np.testing.assert_allclose(values(test), list(TRUTH.values()), rtol=0.15)
 
 

@@ -46,18 +46,14 @@ def test_contact_radii_of_other_shapes():
     assert radius_at_target(Sphere(1e-3), SIDE, BARE, "indentation", -1e-9) == 0
 
 
-def test_coarse_pull_offs_are_doubted_if_the_path_unloads():
+def test_coarse_grids_long_ranges_and_coarse_pull_offs_are_doubted():
     """The force on a punch with 8 cells in its radius is 0.765 of Kendall's (docs/indenter.md)."""
     punch, rubber = surface(CylinderPunch(50e-6), 64, 400e-6), Material(2.7e6, 0.05, 1e-9)
     (found,) = doubts(punch, rubber, Path(forces=[1e-4], unload=True), "boundary_elements")
     assert "has 8 cells: the computed force is about 24 % too small" in found
     assert doubts(punch, rubber, Path(forces=[1e-4]), "boundary_elements") == []
-
-
-def test_coarse_grids_and_long_ranges_are_doubted():
     (found,) = doubts(surface(Sphere(1e-3)), BARE, Path(indentations=[1e-7]), "boundary_elements")
     assert "3.2 cells per contact radius" in found
-    glass, bead = Material(70e9, 0.05), surface(Sphere(10e-6), 96, 12e-6)
-    (found,) = doubts(bead, glass, Path(forces=[2e-3]), "boundary_elements")
-    assert "Tabor parameter 0.34" in found and "17 %" in found
-    assert doubts(bead, glass, Path(forces=[2e-3]), "asperities") == []
+    glass, bead, path = Material(70e9, 0.05), surface(Sphere(10e-6), 96, 12e-6), Path(forces=[2e-3])
+    (found,) = doubts(bead, glass, path, "boundary_elements")
+    assert "Tabor parameter 0.34" in found and "17 %" in found and doubts(bead, glass, path, "asperities") == []

@@ -122,15 +122,11 @@ def test_both_models_are_at_the_same_target(data):
         assert one == pytest.approx(other, rel=1e-3)
 
 
-def test_failures_are_shown_and_runs_without_a_step_are_counted(page, data):
-    assert contact_of(data, FAILED)["failures"]["asperities"] == printable(REASON)
-    assert not {"\u202e", "\x1b"} & set(page.read_text(encoding="utf-8"))
-    assert NOTHING[0] == "slopes" and len(data["contacts"]) == len({each._replace(model="") for each in runs()}) - 1
-    assert "Omitted: 1 without any step" in page.read_text(encoding="utf-8")
-
-
-def test_the_page_needs_no_other_files_and_no_network(page):
+def test_the_page_shows_failures_counts_runs_without_a_step_and_needs_no_network(page, data):
     text = page.read_text(encoding="utf-8")
+    assert contact_of(data, FAILED)["failures"]["asperities"] == printable(REASON)
+    assert not {"\u202e", "\x1b"} & set(text) and "Omitted: 1 without any step" in text
+    assert NOTHING[0] == "slopes" and len(data["contacts"]) == len({each._replace(model="") for each in runs()}) - 1
     assert "default-src 'none'" in text and "://" not in text
     assert not re.search(r"<(script|img|iframe|object)[^>]* src=", text) and "@import" not in text
     # A title cannot end a script.

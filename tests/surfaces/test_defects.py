@@ -136,9 +136,10 @@ def test_outliers_are_said_and_replaced_on_request(examined):
     plain = examined(PLAIN).surface.heights
     difference = removed.surface.heights - plain
     assert np.ptp(difference[elsewhere]) < 0.01 * RMS and np.ptp(difference) < 0.5 * RMS
-
-
-def test_missing_points_stay_missing_beside_outliers(examined):
+    # A filled outlier is no reason for a cut-off, as noise is. Missing points beside outliers stay missing.
+    assert "cutoff" not in removed.advice and "recommended: `cutoff" not in lines(removed)
+    noisy = examined(PLAIN + 0.2 * RMS * np.random.default_rng(4).normal(size=PLAIN.shape))
+    assert "cutoff" in noisy.advice
     heights = with_spikes()
     heights[20, 20] = np.nan
     with pytest.raises(UnfitTopography, match="1 of 4096 points without a height"):
@@ -146,7 +147,7 @@ def test_missing_points_stay_missing_beside_outliers(examined):
     assert examined(heights, outliers="remove", missing="fill").filled == 1
 
 
-def test_offsets_curvature_and_anisotropy_are_said(examined):
+def test_other_defects_are_said(examined):
     stepped = examined(PLAIN + OFFSETS)
     assert "the lines along x have steps of" in lines(stepped) and "`levelling: lines` removes them" in lines(stepped)
     levelled = lines(examined(PLAIN + OFFSETS, levelling="lines"))
@@ -156,9 +157,6 @@ def test_offsets_curvature_and_anisotropy_are_said(examined):
     assert "of the variance and was removed" in lines(examined(SURFACES["cylinder"], detrend="curvature"))
     assert "anisotropic" in lines(examined(PLAIN + 3 * RMS * np.sin(40 * Y)))
     assert not any(word in lines(examined(PLAIN)) for word in ("outlier", "steps from", "paraboloid", "anisotropic"))
-
-
-def test_many_filled_points_and_edges_that_do_not_fit_are_said(examined):
     holey = PLAIN.copy()
     holey[20:45, 10:40] = np.nan
     assert "warning: more than 5 % of the heights are interpolated" in lines(examined(holey, missing="fill"))
@@ -190,10 +188,3 @@ def test_scattered_points_are_interpolated_on_request(tmp_path):
     inside, spacing = found.surface.heights[4:-4, 4:-4] / 1e-9, found.surface.spacing / 1e-6
     np.testing.assert_allclose(np.diff(inside, axis=1), 0.2 * spacing, rtol=1e-4)
     np.testing.assert_allclose(np.diff(inside, axis=0), -0.1 * spacing, rtol=1e-4)
-
-
-def test_a_filled_outlier_is_no_reason_for_a_cut_off(examined):
-    scan = examined(with_spikes(), outliers="remove")
-    assert "cutoff" not in scan.advice and "recommended: `cutoff" not in lines(scan)
-    noisy = examined(PLAIN + 0.2 * RMS * np.random.default_rng(4).normal(size=PLAIN.shape))
-    assert "cutoff" in noisy.advice

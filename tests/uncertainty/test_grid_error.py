@@ -5,12 +5,10 @@ import math
 import cyclic_campaign as cyclic
 import numpy as np
 import pytest
-import small_campaign as small
 from drawn import legend
 
 import icha
 from icha.datasets.campaign_file import campaign_tree
-from icha.datasets.labels import RunLabels
 from icha.figures import against_parameter
 from icha.figures import loops as loop_figures
 from icha.figures.drawn import caption_of
@@ -26,19 +24,17 @@ from icha.uncertainty.grid_error import (
 )
 from validation import loop_grid
 
-LABELS = RunLabels("pull", "boundary_elements", "rough", 1, 1.0, "soft")
 QUANTITIES = ("pull_off_pressure", "hysteresis_loss")
 
 
-def loops(cells, seeds=(1, 2)):
+def loops(cells):
     """Loops of boundary elements whose length has a number of cells."""
-    runs = {seed: cyclic.unloaded(small.run(seed=seed, material="soft")) for seed in seeds}
-    found = []
-    for seed, run in runs.items():
+
+    def resolved(seed, run):
         curvature = run["rms_curvature"] * float(cells_of_length(run) / cells) ** 1.5
-        run = run.assign(resolved_tension=1.0, rms_curvature=curvature.assign_attrs(run["rms_curvature"].attrs))
-        found.append((LABELS._replace(seed=seed), run.assign_attrs(contact_model=LABELS.model)))
-    return campaign_tree(found)
+        return run.assign(rms_curvature=curvature.assign_attrs(run["rms_curvature"].attrs))
+
+    return campaign_tree(cyclic.pulls((1, 2), resolved))
 
 
 @pytest.mark.parametrize("variable", QUANTITIES)

@@ -3,15 +3,12 @@
 import cyclic_campaign as cyclic
 import numpy as np
 import pytest
-import small_campaign as small
-import xarray as xr
 from sampled_cases import COUNT, sampled
 
 from icha.analysis.checks import check_campaign
 from icha.checks.run import attributes_of_failure, check_run
 from icha.datasets.campaign import select_run
 from icha.datasets.campaign_file import campaign_tree
-from icha.datasets.labels import RunLabels
 from icha.datasets.table import tidy_table
 from icha.figures import against_parameter, samples
 from icha.figures.captions import count_runs
@@ -96,28 +93,22 @@ def test_sampled_cases_state_what_they_leave_out(without_the_stickiest):
 # --- failed checks of the loss ----------------------------------------------------------------------------------
 
 
-TENSION = xr.Variable((), 1.0, {"units": "Pa", "long_name": "test"})
-LOOP = RunLabels("pull", "boundary_elements", "rough", 2, 1.0, "soft")
-
-
 def loops(gains=()):
     """Loops of five seeds; in some of them, unions gain energy."""
-    runs = []
-    for seed in range(1, 6):
-        run = cyclic.unloaded(small.run(seed=seed, material="soft"))
-        if seed in gains:
-            gained = run["dissipated_by_coalescence"] - 0.05 * run["work"].max()
-            run = run.assign(dissipated_by_coalescence=gained)
-            attributes = attributes_of_failure(check_run(run))
-            assert list(attributes) == ["failed_loss_checks"]
-            run = run.assign_attrs(attributes)
-        run = run.assign(resolved_tension=TENSION).assign_attrs(contact_model=LOOP.model)
-        runs.append((LOOP._replace(seed=seed), run))
-    return campaign_tree(runs)
+
+    def gain(seed, run):
+        if seed not in gains:
+            return run
+        run = run.assign(dissipated_by_coalescence=run["dissipated_by_coalescence"] - 0.05 * run["work"].max())
+        attributes = attributes_of_failure(check_run(run))
+        assert list(attributes) == ["failed_loss_checks"]
+        return run.assign_attrs(attributes)
+
+    return campaign_tree(cyclic.pulls(range(1, 6), gain))
 
 
 def test_a_failed_check_of_the_loss_leaves_pull_off_and_areas():
-    tree, whole = loops(gains=(2, 3)), loops()
+    tree, whole, second = loops(gains=(2, 3)), loops(), cyclic.PULL._replace(seed=2)
     answers, before = (
         {a.quantity: a for a in answers_of(estimate_campaign(t)["pull"].to_dataset())} for t in (tree, whole)
     )
@@ -126,11 +117,11 @@ def test_a_failed_check_of_the_loss_leaves_pull_off_and_areas():
     assert loss.note.startswith("; 3 of 5 seeds of boundary elements; 2 failed a check of the loss; biased, so no")
     assert "±" not in loss.number and "from" not in loss.number and np.isnan(loss.low)
     # The run is reported as failed, and its loss is in no table and no figure.
-    run = select_run(tree, LOOP)
+    run = select_run(tree, second)
     assert "pull_off_pressure" in run and "hysteresis_loss" not in run
     assert run.attrs["failed_loss_checks"].startswith("unions lose energy: 0.05")
     failed = {check.subject for check in check_campaign(tree) if not check.passed and "/" in check.subject}
-    assert failed == {str(LOOP), str(LOOP._replace(seed=3))}
+    assert failed == {str(second), str(cyclic.PULL._replace(seed=3))}
     table = tidy_table(tree)
     table = table[table.seed == 2]
     assert table.filter(like="hysteresis_loss").isna().all(axis=None) and set(table.status) == {"failed_loss_checks"}

@@ -50,23 +50,21 @@ def test_indices_are_those_of_the_known_function(tree):
     assert set(data["degree"].values[data["response_quantity"] == "mean_gap"]) == {0}
 
 
-def test_cases_without_a_result_do_not_count():
+def test_cases_without_a_result_do_not_count_and_full_contact_not_for_the_infinite_stiffness():
     runs, samples = sampled()
-    runs[3] = runs[3][0], runs[3][1].assign_attrs(applicability="the model is not applicable")
-    data = sensitivity_of_campaign(campaign_tree(runs), {"one": samples})["one"].to_dataset()
-    assert set(data["case_count"].values) == {COUNT - 1}
-    assert np.isnan(data["contact_area_fraction"].values[0, 0, 3]).all()
-
-
-def test_full_contact_is_left_out_of_the_stiffness_alone():
-    """The stiffness of full contact is infinite."""
-    runs, samples = sampled()
-    runs[3] = runs[3][0], runs[3][1].assign(contact_stiffness=runs[3][1]["contact_stiffness"] * np.inf)
-    data = sensitivity_of_campaign(campaign_tree(runs), {"one": samples})["one"].to_dataset()
-    of_stiffness = data["response_quantity"].values == "contact_stiffness"
-    assert set(data["case_count"].values[of_stiffness]) == {COUNT - 1} and not np.isinf(data["contact_stiffness"]).any()
-    assert set(data["case_count"].values[~of_stiffness]) == {COUNT}
-    assert "1 in full contact" in data["left_out"].values[of_stiffness][0]
+    failed, full = list(runs), list(runs)
+    labels, run = runs[3]
+    failed[3] = labels, run.assign_attrs(applicability="the model is not applicable")
+    full[3] = labels, run.assign(contact_stiffness=run["contact_stiffness"] * np.inf)
+    failed, full = (
+        sensitivity_of_campaign(campaign_tree(r), {"one": samples})["one"].to_dataset() for r in (failed, full)
+    )
+    assert set(failed["case_count"].values) == {COUNT - 1}
+    assert np.isnan(failed["contact_area_fraction"].values[0, 0, 3]).all()
+    of_stiffness = full["response_quantity"].values == "contact_stiffness"
+    assert set(full["case_count"].values[of_stiffness]) == {COUNT - 1} and not np.isinf(full["contact_stiffness"]).any()
+    assert set(full["case_count"].values[~of_stiffness]) == {COUNT}
+    assert "1 in full contact" in full["left_out"].values[of_stiffness][0]
 
 
 def test_words_and_figures_state_the_indices(tree):

@@ -157,6 +157,11 @@ def test_a_surface_that_a_model_cannot_compute_affects_no_other_run(sweep, datas
     assert not problems_with_file(RUN, run.assign_attrs(config_sha256=64 * "0"))
     again, _ = sweep("again", BARE, path, ridges(), model)
     assert again.read_bytes() == odd.read_bytes()
+    # Boundary elements need no summits; a uniform ridge is in contact along its whole length.
+    whole = read_run(sweep("cells", BARE, PATH, ridges(), "boundary_elements")[0])
+    touched = whole["contact_map"].values[0] > 0
+    assert "incomplete" not in whole.attrs and int(whole["asperity_count"]) == 0
+    assert touched.any() and np.all(touched.all(axis=1) == touched.any(axis=1))
     file, labels = dataset({"ridges/bare": odd, "pitted/bare": pit}, model)
     tree = read_campaign(file)
     assert tree["sticky"]["status"].values.ravel().tolist() == [1, 0]
@@ -167,20 +172,6 @@ def test_a_surface_that_a_model_cannot_compute_affects_no_other_run(sweep, datas
     )
 
 
-def test_boundary_elements_need_no_summits(sweep):
-    file, _ = sweep("ridges", BARE, PATH, ridges(), "boundary_elements")
-    run = read_run(file)
-    assert "incomplete" not in run.attrs and int(run["asperity_count"]) == 0
-    # A uniform ridge is in contact along its whole length.
-    touched = run["contact_map"].values[0] > 0
-    assert touched.any() and np.all(touched.all(axis=1) == touched.any(axis=1))
-
-
-def test_an_impossible_state_is_a_failed_run(sweep):
-    run = read_run(sweep("far", BARE, PATH | {"snapshots": [("relative_load", 1e-30)]})[0])
-    assert run.sizes["step"] == 0 and run.attrs["incomplete"].startswith("nothing was computed: path: ")
-
-
 @pytest.mark.parametrize("error", [ZeroDivisionError("division by zero"), np.linalg.LinAlgError("singular matrix")])
 def test_any_error_of_the_computation_is_a_failed_run(sweep, monkeypatch, error):
     monkeypatch.setattr("icha.simulation.record.follow", Mock(side_effect=error))
@@ -189,6 +180,9 @@ def test_any_error_of_the_computation_is_a_failed_run(sweep, monkeypatch, error)
     assert str(error) in run.attrs["incomplete"] and run.sizes["step"] == 0
     # The log has the traceback of unexpected errors.
     assert any("Traceback" in line for line in said) == (not isinstance(error, ValueError))
+    monkeypatch.undo()
+    run = read_run(sweep("far", BARE, PATH | {"snapshots": [("relative_load", 1e-30)]})[0])
+    assert run.sizes["step"] == 0 and run.attrs["incomplete"].startswith("nothing was computed: path: ")
 
 
 def test_values_that_are_not_finite_end_a_run_and_keep_the_steps_before(sweep, dataset, monkeypatch):
