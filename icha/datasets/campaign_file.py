@@ -140,7 +140,7 @@ class _Study:
         self.axes: dict[str, Any] = {label: list(dict.fromkeys(getattr(r, label) for r in design)) for label in LABELS}
         self.axes["seed"].sort()
         self.axes["rms_slope"] = arrange_slopes((labels.surface, labels.rms_slope) for labels in design)
-        self.places = _positions(self.axes, design)
+        self.places = {labels: self._place(labels) for labels in design}
         runs = [found[labels] for labels in design if labels in found]
         if not runs:
             raise ValueError(f"study {name}: no run is computed; expected at least one run")
@@ -165,6 +165,12 @@ class _Study:
         self.sizes |= {label: len(self.axes[label]) for label in LABELS}
         self.sizes["rms_slope"] = self.axes["rms_slope"].shape[-1]
         self.varies_with = VARIES_WITH_OWN_UNITS if self._has_own_units() else VARIES_WITH
+
+    def _place(self, labels: RunLabels) -> tuple[int, ...]:
+        """Return the index of a run along each label."""
+        at = {label: self.axes[label].index(getattr(labels, label)) for label in LABELS if label != "rms_slope"}
+        slopes = self.axes["rms_slope"][at["surface"]] if self.axes["rms_slope"].ndim == 2 else self.axes["rms_slope"]
+        return tuple((at | {"rms_slope": int(np.argmax(slopes == labels.rms_slope))})[label] for label in LABELS)
 
     def _has_own_units(self) -> bool:
         """Return whether runs of equal rms slopes may have different units: with shapes, and with rms heights."""
@@ -320,20 +326,6 @@ def _along_label(name: str, label: str, unit: str, by_name: Mapping, axes: Mappi
     else:
         values = np.array(["" if value is None else str(value) for value in given], object)
     return xr.Variable((label,), values, attributes)
-
-
-def _positions(axes: Mapping[str, Any], design: list[RunLabels]) -> dict[RunLabels, tuple[int, ...]]:
-    """Return the index of every run of a design along each label."""
-    at = {(label, value): k for label in LABELS if label != "rms_slope" for k, value in enumerate(axes[label])}
-    rows = np.broadcast_to(axes["rms_slope"], (len(axes["surface"]), axes["rms_slope"].shape[-1])).tolist()
-    for surface, row in zip(axes["surface"], rows, strict=True):
-        at |= {((surface, "rms_slope"), slope): k for k, slope in enumerate(row)}
-    return {
-        labels: tuple(
-            at[(labels.surface, label) if label == "rms_slope" else label, getattr(labels, label)] for label in LABELS
-        )
-        for labels in design
-    }
 
 
 def _plain(labels: RunLabels | tuple) -> RunLabels:

@@ -24,11 +24,6 @@ RUN = "{study}/{surface}/seed{seed}/slope{slope}/{model_folder}{material}"
 _SAME_SLOPE = 1e-9
 
 
-def model_folder(model: str) -> str:
-    """Return the folder of a model in the path of a run, with a slash at the end; "" if the model has no folder."""
-    return MODELS[model].folder
-
-
 def coarse_study(study: str) -> str:
     """Return the name of the study with the runs of another study on half the grid."""
     return f"{study}-coarse"
@@ -77,7 +72,7 @@ LABELS = RunLabels._fields[1:]
 
 def path_fields(labels: RunLabels) -> dict[str, str]:
     """Return the text for each field in a path pattern, by name of the field."""
-    slope = {"slope": number_label(labels.rms_slope), "model_folder": model_folder(labels.model)}
+    slope = {"slope": number_label(labels.rms_slope), "model_folder": MODELS[labels.model].folder}
     return {name: str(value) for name, value in labels._asdict().items()} | slope
 
 

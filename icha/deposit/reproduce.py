@@ -14,7 +14,7 @@ from icha.configuration.errors import ConfigurationError
 from icha.configuration.load import INPUTS, load_configuration
 from icha.configuration.yaml_files import read_yaml
 from icha.datasets.attributes import why_no_result
-from icha.datasets.results import CONFIGURATION, RUN
+from icha.datasets.results import CONFIGURATION
 from icha.datasets.stamp import read_stamp
 from icha.deposit.program import version_differences
 from icha.deposit.verify import CHECKSUMS, SOURCE, files_of, read_text
@@ -28,8 +28,6 @@ SMALLEST = "smallest"
 _PYPROJECT, _LOCK = f"{SOURCE}/pyproject.toml", f"{SOURCE}/uv.lock"
 # Entries in the folder of a rerun: file with the checksum of SHA256SUMS, and folder for configuration and results.
 _BEGUN, _PROJECT = "rerun-of.sha256", "data"
-_PARTS = dict.fromkeys(("study", "surface", "seed", "slope", "material"), "[^/]+")
-_RUN = re.compile(RUN.format(**_PARTS, model_folder="(?:[^/]+/)?"))
 
 
 class RerunError(ValueError):
@@ -76,7 +74,7 @@ def find_runs(only: Iterable[str], deposit: Path) -> list[str]:
 
     A name is `study/surface/seed1/slope1/material`, as in the path of the run. Raise `RerunError` for other names.
     """
-    runs = [name for name in files_of(deposit) if _RUN.fullmatch(name)]
+    runs = [name for name in files_of(deposit) if name.startswith("runs/") and name.endswith(".nc")]
     found = []
     for name in only:
         path = _smallest(deposit, runs) if name == SMALLEST and runs else f"runs/{_label(name)}.nc"

@@ -198,8 +198,6 @@ def _window(nodes, side, corner, width):
 
 # --- figure 6 ---
 
-_SNAPSHOTS = ("relative_load", "area_fraction")
-
 
 @in_style
 def spots_by_slope(
@@ -226,7 +224,7 @@ def spots_by_slope(
         sector of each circle in panel (b).""",
     )
     length, unit = choose_unit(float(runs[0][1]["period"]), "m")
-    for ax, kind in zip(panels, _SNAPSHOTS, strict=True):
+    for ax, kind in zip(panels, ("relative_load", "area_fraction"), strict=True):
         _draw_slopes(ax, runs, kind, colours, length)
         ax.set(aspect="equal", xlabel=f"$x$ ({unit})")
     panels[0].set_ylabel(f"$y$ ({unit})")

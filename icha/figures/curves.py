@@ -9,13 +9,13 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from icha.analysis.common_loads import at_common_loads
-from icha.contact.models import REFERENCE_MODEL
+from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
 from icha.datasets.quantities import label_of, quantity
 from icha.figures import select
 from icha.figures.captions import about_boundary_elements
 from icha.figures.drawn import Name, plot, record, say
 from icha.figures.ensembles import draw_members, draw_points, mark_fewer
-from icha.figures.looks import ASPERITIES_NAME, BRANCH_DASHES, MODEL_MARKERS, Looks, model_handle
+from icha.figures.looks import BRANCH_DASHES, MODEL_MARKERS, Looks, model_handle
 from icha.figures.style import GREY, legend_handle, logarithmic_axes
 from icha.support.formatting import choose_unit
 
@@ -148,17 +148,17 @@ def study_curves(
     groups = select.group_by_contact(campaign, select.select_runs(campaign, study, ragged=False))
     groups = list(filter(has_points, groups)) or groups
     dataset = campaign[study].to_dataset()
-    name, lines = select.shown_name(dataset), []
-    other = boundary_elements or (study if name == ASPERITIES_NAME else None)
+    by_asperities, lines = groups[0].labels.model == DEFAULT_MODEL, []
+    other = boundary_elements or (study if by_asperities else None)
     truths = select.select_runs(campaign, other, ragged=False, model=REFERENCE_MODEL) if other else []
     grouped = list(filter(has_points, select.group_by_contact(campaign, truths)))
     materials = dataset["material"].values.tolist()
     drawn = sorted((group.line for group in groups), key=lambda line: materials.index(line.material))
-    looks = Looks(campaign, [study], drawn, crosses=bool(grouped) or name != ASPERITIES_NAME)
+    looks = Looks(campaign, [study], drawn, crosses=bool(grouped) or not by_asperities)
     changed: dict[str, object] = {"mfc": "none"} if open_markers and not looks.by_place else {}
     for group in groups:
         look = looks.look(group.line) | {"ls": "-" if looks.many else "none"} | changed
-        if name != ASPERITIES_NAME:
+        if not by_asperities:
             look |= {"marker": looks.cross(group.line, group.model_name)["marker"], "ms": look["ms"] + 2}
         lines.append(_curve(group, look))
     crosses = [_curve(truth, looks.cross(truth.line._replace(doubt=""), truth.model_name)) for truth in grouped]

@@ -47,8 +47,7 @@ def plot_contact(run: xr.Dataset, axes: Axes | None = None, *, snapshot: int = -
     axes : axes to draw on; None for new axes.
     snapshot : number of the snapshot; the last one by default.
     """
-    axes = _new_axes() if axes is None else axes
-    side = float(run["period"])
+    axes, side = axes or plt.subplots()[1], float(run["period"])
     factor, unit = choose_unit(side, "m")
     if "contact_map" in run:
         contact = run["contact_map"].isel(snapshot=snapshot).transpose("row", "column").values
@@ -99,11 +98,7 @@ def plot_jkr_test(test: JKRTest) -> Figure:
 
 
 def _plot_against_pressure(run, name, axes, look):
-    axes, panel = _new_axes() if axes is None else axes, panel_in_units("nominal_pressure", name, run)
+    axes, panel = axes or plt.subplots()[1], panel_in_units("nominal_pressure", name, run)
     axes.plot(*panel.points(run), **{"marker": "o", "ms": 3} | look)
     panel.label(axes)
     return axes
-
-
-def _new_axes():
-    return plt.subplots()[1]

@@ -194,11 +194,6 @@ def shown_model(study: xr.Dataset) -> str:
     return first_model(study["model"].values.tolist())
 
 
-def shown_name(study: xr.Dataset) -> str:
-    """Return the name of the `shown_model` of a study in legends."""
-    return MODELS[shown_model(study)].words
-
-
 def select_by_labels(
     runs: Iterable[tuple[RunLabels, xr.Dataset]], **wanted: object
 ) -> list[tuple[RunLabels, xr.Dataset]]:
