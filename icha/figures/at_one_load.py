@@ -16,7 +16,7 @@ from icha.figures.curves import drop_rounding_errors
 from icha.figures.drawn import plot, say
 from icha.figures.ensembles import draw_members, join_bins
 from icha.figures.looks import MODEL_MARKERS, REFERENCE_NAME, TRUTH_LINE, Looks, legend_below, model_handle
-from icha.figures.select import NothingToDraw, has_layer, has_shape, select_snapshots, snapshot_label
+from icha.figures.select import Members, NothingToDraw, has_layer, has_shape, select_snapshots, snapshot_label
 from icha.figures.style import BLACK, GREY, TWO_COLUMNS, in_style, logarithmic_axes, new_panels, slope_label
 from icha.references.persson import persson_pressure_density
 from icha.support.formatting import choose_unit
@@ -150,7 +150,7 @@ def _draw_singular_tail(ax, line, lowest, colour):
         ax.plot([], [], color=GREY, label="singular tension at the edge", **look)
 
 
-def singular_tail(members: Sequence[tuple[xr.Dataset, int]], lowest: float) -> tuple[np.ndarray, np.ndarray]:
+def singular_tail(members: Members, lowest: float) -> tuple[np.ndarray, np.ndarray]:
     """Return pressures p/(E* h'_rms) and mean densities P(p) E* h'_rms for tensions that the grid does not resolve.
 
     At a distance x from the edge of contact, the tension is K_c/sqrt(2 pi x), with K_c^2 = 2 E* dgamma. With the
@@ -168,7 +168,7 @@ def singular_tail(members: Sequence[tuple[xr.Dataset, int]], lowest: float) -> t
     return p, edge * intensity / (np.abs(p) ** 3 * unit**2)
 
 
-def gap_densities(members: Sequence[tuple[xr.Dataset, int]]) -> tuple[np.ndarray, np.ndarray]:
+def gap_densities(members: Members) -> tuple[np.ndarray, np.ndarray]:
     """Return reduced gaps u/h_rms, and for each snapshot the densities P(u) h_rms; bins with few cells are joined."""
     (first, _), *_ = members
     edges = first["gap_bin_edges"].values / float(first["unit_height"])
@@ -179,9 +179,7 @@ def gap_densities(members: Sequence[tuple[xr.Dataset, int]]) -> tuple[np.ndarray
     return np.sqrt(edges[:-1] * edges[1:]), densities
 
 
-def pressure_densities(
-    members: Sequence[tuple[xr.Dataset, int]], *, joined: bool = False
-) -> tuple[np.ndarray, np.ndarray]:
+def pressure_densities(members: Members, *, joined: bool = False) -> tuple[np.ndarray, np.ndarray]:
     """Return reduced pressures p/(E* h'_rms), and for each snapshot the densities P(p) E* h'_rms.
 
     Empty bins are left out. If `joined` is True (for boundary elements), bins with few nodes are joined.

@@ -1,6 +1,6 @@
 """Select runs, snapshots and errors for a figure from the datasets of a campaign."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -33,6 +33,12 @@ def name_of_model(run: xr.Dataset) -> str:
 
 class NothingToDraw(ValueError):
     """The campaign has no complete run that the figure could show; the message names what is missing."""
+
+
+# Labels and dataset of each run.
+LabelledRuns = list[tuple[RunLabels, xr.Dataset]]
+# A run and the index of a snapshot of it, for each run of an ensemble.
+Members = Sequence[tuple[xr.Dataset, int]]
 
 
 class Line(NamedTuple):
@@ -108,7 +114,7 @@ class ContactRuns(NamedTuple):
         return next(iter(self.by_seed.values()))
 
     @property
-    def members(self) -> list[tuple[RunLabels, xr.Dataset]]:
+    def members(self) -> LabelledRuns:
         """Labels and dataset of every run."""
         return [(self.labels._replace(seed=seed), run) for seed, run in self.by_seed.items()]
 
@@ -119,9 +125,7 @@ class ContactRuns(NamedTuple):
 
 
 def group_by_contact(
-    campaign: xr.DataTree,
-    runs: Iterable[tuple[RunLabels, xr.Dataset]],
-    doubt_of_run: Callable[[xr.Dataset], str] | None = None,
+    campaign: xr.DataTree, runs: LabelledRuns, doubt_of_run: Callable[[xr.Dataset], str] | None = None
 ) -> list[ContactRuns]:
     """Group runs that differ only in their seed; `doubt_of_run` states why a run is drawn pale (`doubt_about`)."""
     found: dict[tuple, ContactRuns] = {}
@@ -134,9 +138,7 @@ def group_by_contact(
     return list(found.values())
 
 
-def select_runs(
-    campaign: xr.DataTree, study: str, *, ragged: bool = True, model: str | None = None
-) -> list[tuple[RunLabels, xr.Dataset]]:
+def select_runs(campaign: xr.DataTree, study: str, *, ragged: bool = True, model: str | None = None) -> LabelledRuns:
     """Return all complete runs of a study that use one model: `model`, or by default the `shown_model` of the study.
 
     Spots and events of the runs are left out unless they are `ragged`, which is much slower. Raise `NothingToDraw` if
@@ -194,14 +196,11 @@ def shown_model(study: xr.Dataset) -> str:
     return first_model(study["model"].values.tolist())
 
 
-def select_by_labels(
-    runs: Iterable[tuple[RunLabels, xr.Dataset]], **wanted: object
-) -> list[tuple[RunLabels, xr.Dataset]]:
+def select_by_labels(runs: LabelledRuns, **wanted: object) -> LabelledRuns:
     """Return the runs with the wanted labels; None stands for the label of the first run.
 
     Raise `NothingToDraw` if no run has a wanted label.
     """
-    runs = list(runs)
     for name, value in wanted.items():
         present = [getattr(labels, name) for labels, _ in runs]
         value = present[0] if value is None else value
@@ -256,8 +255,8 @@ class Snapshots(NamedTuple):
     """
 
     runs: ContactRuns
-    members: list[tuple[xr.Dataset, int]]
-    truths: list[tuple[xr.Dataset, int]]
+    members: Members
+    truths: Members
 
     @property
     def truth_name(self) -> Name:
@@ -302,9 +301,7 @@ def snapshot_label(run: xr.Dataset, snapshot: int) -> str:
 ROUNDING = 1e-9
 
 
-def select_unloaded_runs(
-    campaign: xr.DataTree, study: str, model: str | None = None
-) -> list[tuple[RunLabels, xr.Dataset]]:
+def select_unloaded_runs(campaign: xr.DataTree, study: str, model: str | None = None) -> LabelledRuns:
     """Return the runs of a study that unload, without spots and events; `model` is the preferred model, if any.
 
     Raise `NothingToDraw` if no run is complete, or if no run unloads.
