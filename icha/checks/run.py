@@ -1,7 +1,7 @@
 """Checks of one run: physical identities and limits that are computed from the dataset of the run alone."""
 
-import math
 from collections.abc import Hashable, Iterable, Iterator, Mapping
+from types import SimpleNamespace
 
 import numpy as np
 import xarray as xr
@@ -9,10 +9,11 @@ import xarray as xr
 from icha.checks.findings import IDENTITY_LIMIT, Check, RunArrays, compare_with_limit
 from icha.checks.loops import EVENT_COUNTS, OF_ENERGIES, OF_LOOPS, check_loop, finite_stiffness
 from icha.contact.attraction import FINITE_RANGE, SHORT_RANGE
+from icha.contact.model import AREA_FRACTION, PRESSURE
 from icha.contact.models import AREA_TOLERANCE_CELLS, AREA_TOLERANCE_PART, SMALLEST_LOAD, model_of
 from icha.datasets.variables.run import INDENTER, OF_MODELS, RUN
 from icha.datasets.variables.terms import INFINITE
-from icha.path.targets import AREAS, BETWEEN, CONTACT_RADIUS, LOADS
+from icha.path.targets import AREAS, BETWEEN, LOADS, MEAN_SEPARATION, QUANTITIES
 
 # Largest error of an equilibrium, in h_rms, and largest relative error of a target. Boundary elements meet loads and
 # areas to 1e-6 (`PathAccuracy.target`).
@@ -178,37 +179,26 @@ def _retreats(loading):
 
 def _target_error(run):
     """Return the largest relative error of a target; areas counted in cells may differ by the area tolerance."""
-    scale, nominal_area = float(run["contact_modulus"]), float(run["period"]) ** 2
-    reached = {
-        "reduced_pressure": run["reduced_pressure"],
-        "relative_load": run["nominal_pressure"] / scale,
-        "area_fraction": run["contact_area_fraction"],
-        "mean_separation": run["mean_separation"],
-        "pressure": run["nominal_pressure"],
-        "force": run["nominal_pressure"] * nominal_area,
-        "indentation": -run["mean_separation"],
-        "contact_radius": run["contact_area_fraction"],
-        BETWEEN: run["mean_separation"],
-    }
-    target, kinds = run["step_target"], [str(kind) for kind in run["step_kind"]]
-    # For a contact radius, areas are compared.
-    radius = np.array([kind == CONTACT_RADIUS for kind in kinds])
-    target = np.where(radius, np.pi * target**2 / nominal_area, target)
-    value = np.array([reached[kind][k] for k, kind in enumerate(kinds)])
-    error = np.abs(value - target)
-    adhesive = float(run["surface_energy"]) > 0
+    modulus, adhesive = float(run["contact_modulus"]), float(run["surface_energy"]) > 0
+    contact = SimpleNamespace(
+        area=float(run["period"]) ** 2, contact_modulus=modulus, pressure_unit=modulus * float(run["unit_slope"])
+    )
+    states = {PRESSURE: run["nominal_pressure"], AREA_FRACTION: run["contact_area_fraction"]}
+    states[None] = run["mean_separation"]
+    kinds = [MEAN_SEPARATION if kind == BETWEEN else str(kind) for kind in run["step_kind"]]
+    asked = [QUANTITIES[kind] for kind in kinds]
+    # Pressures (Pa), area fractions and separations (m).
+    target = np.array([each.prescribed(contact, value) for each, value in zip(asked, run["step_target"], strict=True)])
+    error = np.abs(np.array([states[each.controlled][k] for k, each in enumerate(asked)]) - target)
     if model_of(run.attrs).by_cells and run.attrs.get("attraction") != SHORT_RANGE:
-        of_area = np.array([kind in AREAS for kind in kinds])
         cells = np.minimum(AREA_TOLERANCE_CELLS / float(run["grid"]) ** 2, AREA_TOLERANCE_PART * np.abs(target))
-        error = np.where(of_area, np.maximum(error - cells, 0.0), error)
+        error = np.where(np.isin(kinds, AREAS), np.maximum(error - cells, 0.0), error)
     # If the target is zero load, the error is relative to the largest load of the run.
-    largest = np.array([np.max(np.abs(reached[kind])) for kind in kinds])
+    largest = np.array([np.max(np.abs(states[each.controlled])) for each in asked])
     # With adhesion a load may be a small difference of attraction and repulsion. Each of them is about as large as the
     # stiffness times h_rms. Therefore the error of a very small load is relative to SMALLEST_LOAD times this product.
     gross = np.abs(finite_stiffness(run)) * float(run["unit_height"]) * adhesive
-    unit = {"reduced_pressure": scale * float(run["unit_slope"]), "relative_load": scale, "pressure": 1.0}
-    unit["force"] = 1 / nominal_area
-    least = np.array([SMALLEST_LOAD * gross[k] / unit.get(kind, math.inf) for k, kind in enumerate(kinds)])
+    least = np.where(np.isin(kinds, LOADS), SMALLEST_LOAD * gross, 0.0)
     return np.max(error / np.where(target != 0, np.maximum(np.abs(target), least), largest))
 
 
