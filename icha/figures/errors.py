@@ -7,7 +7,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from icha.datasets.labels import RunLabels, place_of, surfaces_and_slopes
-from icha.datasets.quantities import label_of
+from icha.datasets.quantities import label_of, quantity
 from icha.datasets.variables.campaign import NOT_IN_DESIGN
 from icha.figures.captions import range_of_attraction
 from icha.figures.drawn import Name, say
@@ -38,18 +38,19 @@ area in contact in at least one model."""
 def model_error(campaign: xr.DataTree, model_error: xr.DataTree, *, study: str) -> Figure:
     """Draw the relative errors of contact area and mean separation."""
     names = "area_error", "separation_error"
-    return _draw_errors(campaign, model_error, study, names, percent=True, words=_AREA_AND_SEPARATION)
+    return _draw_errors(campaign, model_error, study, names, _AREA_AND_SEPARATION)
 
 
 def distribution_error(campaign: xr.DataTree, model_error: xr.DataTree, *, study: str) -> Figure:
     """Draw the distances of the distributions of pressure and gap, and the overlap of the contact maps."""
     names = "pressure_distribution_distance", "gap_distribution_distance", "jaccard"
-    return _draw_errors(campaign, model_error, study, names, percent=False, words=_DISTRIBUTIONS)
+    return _draw_errors(campaign, model_error, study, names, _DISTRIBUTIONS)
 
 
 @in_style
-def _draw_errors(campaign, model_error, study, names, *, percent, words):
-    """Draw variables of the model error against load, with a column of panels for each; in per cent if `percent`."""
+def _draw_errors(campaign, model_error, study, names, words):
+    """Draw variables of the model error against load, with a column of panels for each; `words` are the caption."""
+    factor, unit = quantity(names[0]).in_unit(1.0)  # relative errors are in per cent, and may be negative
     curves = _curves(model_error, study, names)
     own_rows = len({line.place for line in curves}) > _MOST_LINES
     looks = Looks(campaign, [study], curves, by_place=own_rows)
@@ -66,8 +67,8 @@ def _draw_errors(campaign, model_error, study, names, *, percent, words):
             asked = int((errors["status"] != NOT_IN_DESIGN).sum("seed"))
             of_curve = {"name": Name("asperities and boundary elements", labels), "asked": asked}
             for ax, name in zip(row, names, strict=True):
-                members = (100 if percent else 1) * errors[name].values
-                handle = draw_points(ax, loads, members, look, positive=not percent, shift=shift, **of_curve)
+                members = factor * errors[name].values
+                handle = draw_points(ax, loads, members, look, positive=not unit, shift=shift, **of_curve)
             named.setdefault(looks.name(line), handle)
         for ax in row if own_rows else ():
             ax.set_title(looks.material_name(shown[0]), loc="right", fontsize=8)
@@ -75,10 +76,10 @@ def _draw_errors(campaign, model_error, study, names, *, percent, words):
     middle, reach = np.sqrt(low * high), max(_MARGIN * np.sqrt(high / low), _LEAST_REACH)
     for ax, name in zip(panels.ravel(), itertools.cycle(names), strict=False):
         logarithmic_axes(ax, "x")
-        ax.set(xlim=(middle / reach, middle * reach), ylabel=label_of(name, "%" if percent else ""))
+        ax.set(xlim=(middle / reach, middle * reach), ylabel=label_of(name, unit))
         ax.axhline(0, color="0.6", lw=0.7, zorder=0)
     for ax in panels[-1]:
-        ax.set(xlabel=label_of("reduced_pressure"), ylim=(None if percent else 0, None))
+        ax.set(xlabel=label_of("reduced_pressure"), ylim=(None if unit else 0, None))
     legend_below(fig, looks.colour_handles() if own_rows else looks.handles() if looks.many else named)
     say(
         fig, range_of_attraction(model_error[study]["attraction"].values.ravel()), "Points at one load are drawn apart."
