@@ -18,8 +18,8 @@ from pydantic import ValidationError
 from icha.configuration.campaign import Campaign
 from icha.configuration.errors import MOST_PROBLEMS, problem_of
 from icha.configuration.samples import RULES
-from icha.configuration.studies import MEASURED, SCALARS, RmsHeight, Study, slope_of_height
-from icha.configuration.surfaces import SURFACE_KINDS, MaterialSection
+from icha.configuration.studies import MEASURED, RmsHeight, Study, slope_of_height
+from icha.configuration.surfaces import PARAMETERS, SURFACE_KINDS, MaterialSection
 from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
 from icha.datasets.labels import RunLabels, coarse_study, inputs_study, is_derived_study, number_label
 from icha.path.targets import ESTIMATED_AT_TARGETS, ESTIMATED_OF_LOOPS
@@ -33,7 +33,7 @@ _MAX_TARGETS = 5_000_000
 _LISTS = {"surfaces": "surface", "seeds": "seed", "rms_slopes": "rms_slope", "materials": "material"}
 # Order of the lists of a study. The last list changes fastest from run to run.
 _OF_MATERIAL = MaterialSection.model_fields
-_ORDER = ("surface", *(name for name in SCALARS if name not in _OF_MATERIAL), "seed", "rms_slope", "material")
+_ORDER = ("surface", *(name for name in PARAMETERS if name not in _OF_MATERIAL), "seed", "rms_slope", "material")
 _ORDER += tuple(_OF_MATERIAL)
 
 # Name under which a point of a sample has the name of its case. The case is part of the names of its variants, because
@@ -265,7 +265,7 @@ class _Variants:
         """Return the labels of a run; create the variants of surface and material that the run needs."""
         surface, material = point["surface"][1], point["material"][1]
         fields = type(self._campaign.surfaces[surface]).model_fields
-        varied = {name: point[name] for name in point if name in SCALARS}
+        varied = {name: point[name] for name in point if name in PARAMETERS}
         of_surface = {name: varied[name] for name in fields if name in varied}
         of_material = {name: varied[name] for name in _OF_MATERIAL if name in varied}
         for name, (location, value) in varied.items():
@@ -355,7 +355,7 @@ def varied_values(campaign: Campaign) -> dict[str, dict[str, tuple[str, str, dic
     for label, study in campaign.studies.items():
         given = [study.vary, *(study.cases or ()), study.sample and study.sample.parameters]
         names = dict.fromkeys(
-            name for each in given if each for name in SCALARS if getattr(each, name, None) is not None
+            name for each in given if each for name in PARAMETERS if getattr(each, name, None) is not None
         )
         for name in names:
             of_material = name in _OF_MATERIAL

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, create_model, model_validator
 
-from icha.configuration.surfaces import SURFACE_KINDS, MaterialSection
+from icha.configuration.surfaces import PARAMETERS
 from icha.support.rules import SLOPE, FloatRange, IntegerRange
 from icha.support.values import Problem, Section, Seed, integer, rule_of, to_number, to_si
 from icha.uncertainty.distributions import KINDS, Distribution
@@ -64,27 +64,21 @@ def _read_distribution(rule: FloatRange, value: Any) -> Distribution:
 
 
 # Bounds and description of each parameter with continuous values.
-RULES: dict[str, FloatRange] = {}
-_FIELDS: dict[str, Any] = {}
-
-
-def _add(name, rule, description):
-    RULES.setdefault(name, rule)
-    kind = Annotated[Any, BeforeValidator(partial(_read_distribution, rule)), WithJsonSchema(_SCHEMA)]
-    _FIELDS.setdefault(name, (kind, Field(default=None, description=description)))
-
-
-for _section in (*SURFACE_KINDS.values(), MaterialSection):
-    for _name, _field in _section.model_fields.items():
-        if _rule := rule_of(_field):
-            _add(_name, _rule, str(_field.description))
-_add("rms_slope", SLOPE, "Rms slope h'rms, instead of the key `rms_slopes`.")
+RULES = {name: rule for name, field in PARAMETERS.items() if (rule := rule_of(field))} | {"rms_slope": SLOPE}
+_DESCRIPTIONS = {name: PARAMETERS[name].description for name in RULES if name in PARAMETERS}
+_DESCRIPTIONS["rms_slope"] = "Rms slope h'rms, instead of the key `rms_slopes`."
 Parameters = create_model(
     "Parameters",
     __base__=Section,
     __doc__="Distribution of each parameter that is sampled. A list `[low, high]` is a uniform distribution.",
     __module__=__name__,
-    **_FIELDS,
+    **{
+        name: (
+            Annotated[Any, BeforeValidator(partial(_read_distribution, RULES[name])), WithJsonSchema(_SCHEMA)],
+            Field(default=None, description=text),
+        )
+        for name, text in _DESCRIPTIONS.items()
+    },
 )
 
 

@@ -17,7 +17,7 @@ from pydantic import (
 )
 
 from icha.configuration.samples import Sample
-from icha.configuration.surfaces import SURFACE_KINDS, MaterialSection, MeasuredSurface
+from icha.configuration.surfaces import PARAMETERS
 from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.path.snapshots import AreaFraction, Indentation, PathState, ReducedPressure, Snapshot
 from icha.path.targets import (
@@ -182,19 +182,11 @@ class TurningPoint(PathState):
     """A state at which the loading direction changes. Exactly one key must be given. Tensile loads are negative."""
 
 
-# Names and descriptions of the parameters that a study may vary: all keys except these.
-_NOT_VARIED = ("kind", "path", "crop", "shape", "bodies")
-SCALARS: dict[str, str] = {}
-for _section in (*SURFACE_KINDS.values(), MaterialSection):
-    for _name, _field in _section.model_fields.items():
-        # The description of `boundary` is that of measured surfaces, which have most values.
-        if _name not in _NOT_VARIED and (_name != "boundary" or _section is MeasuredSurface):
-            SCALARS.setdefault(_name, str(_field.description))
-
-
 def _section_of_scalars(name, kind, doc, fields=None):
     """Make a section with one key for every parameter that a study may vary; `kind` is the type of the keys."""
-    scalars = {key: (kind | None, Field(default=None, description=text)) for key, text in SCALARS.items()}
+    scalars = {
+        key: (kind | None, Field(default=None, description=field.description)) for key, field in PARAMETERS.items()
+    }
     return create_model(name, __base__=Section, __doc__=doc, __module__=__name__, **(fields or {}), **scalars)
 
 

@@ -17,6 +17,7 @@ from pydantic import (
     field_validator,
     model_validator,
 )
+from pydantic.fields import FieldInfo
 
 from icha.asperity.adhesion_map import MAPS, AdhesionMap, map_of
 from icha.asperity.material import VAN_DER_WAALS_RANGE, Material
@@ -624,3 +625,11 @@ SURFACE_KINDS = {
 AnySurface = Annotated[
     SelfAffineSurface | FileSurface | MeasuredSurface | SmoothSurface | SpectrumSurface, Field(discriminator="kind")
 ]
+# Parameters that a study may vary: all keys of surfaces and materials except these. The description of `boundary` is
+# that of measured surfaces, which have most values.
+_NOT_VARIED = ("kind", "path", "crop", "shape", "bodies")
+PARAMETERS: dict[str, FieldInfo] = {}
+for _section in (*SURFACE_KINDS.values(), MaterialSection):
+    for _name, _field in _section.model_fields.items():
+        if _name not in _NOT_VARIED and (_name != "boundary" or _section is MeasuredSurface):
+            PARAMETERS.setdefault(_name, _field)

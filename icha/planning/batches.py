@@ -9,21 +9,18 @@ stay the same.
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from functools import cache
 from typing import NamedTuple, TypeVar
 
 from icha.configuration.campaign import Campaign
+from icha.contact.models import MODELS
 from icha.datasets.labels import RunLabels
 from icha.datasets.results import figure_number
 from icha.planning import costs
-from icha.planning.requirements import is_resumable, run_threads, surface_threads
 from icha.planning.run_costs import run_costs
 
 # The first batches of a group are shorter, so that several cores share a small group: their number, and their length as
 # a part of `costs.BATCH`.
 _SHORT_BATCHES, _SHORT = 4, 0.2
-# Expected time of a figure, s.
-_FIGURE = 1.6
 # Snakemake reserves this multiple of the expected memory, and this memory in addition, MB.
 _MARGIN, _UNEXPECTED = 1.25, 400
 # Largest number of files in a batch. For each input, Snakemake searches the list of outputs of the batch.
@@ -39,21 +36,21 @@ class Batch(NamedTuple):
     name : name of the batch; names differ among the batches of one kind of file.
     files : paths of the files, or names of the figures.
     seconds : expected time of the computations, s.
-    memory : memory that Snakemake reserves, MB.
+    memory, threads, minutes : memory (MB), cores and time limit (min) that Snakemake reserves.
     """
 
     name: str
     files: list[str]
-    seconds: float
-    memory: int
+    seconds: float = 0.0
+    memory: int = 0
+    threads: int = 1
+    minutes: int = 0
 
 
 def surface_batches(campaign: Campaign, surfaces: Mapping[str, tuple[str, int]]) -> list[Batch]:
     """Return the batches of surfaces; `surfaces` has name and seed of each surface by path."""
-    return _divide(
-        (path, f"surfaces{_large(surface_threads(campaign, name))}", costs.surface_cost(campaign.grid(name)))
-        for path, (name, _) in _by_seed(surfaces, lambda surface: surface)
-    )
+    ordered = _by_seed(surfaces, lambda surface: surface)
+    return _divide((path, "surfaces", costs.surface_cost(campaign.grid(name))) for path, (name, _) in ordered)
 
 
 def theory_batches(theories: Mapping[str, str]) -> list[Batch]:
@@ -65,12 +62,12 @@ def run_batches(campaign: Campaign, runs: Mapping[str, RunLabels]) -> list[Batch
     """Return the batches of runs; `runs` has the labels of each run by path. A run that can resume is alone."""
     cost_of = run_costs(campaign)
 
-    @cache
-    def group_and_cost(contact):
-        cost, group = cost_of[contact], f"{contact.study}_{contact.model}{_large(run_threads(campaign, contact))}"
-        return group, replace(cost, seconds=max(cost.seconds, costs.BATCH)) if is_resumable(campaign, contact) else cost
+    def cost(case):
+        alone = is_resumable(campaign, case)
+        return replace(cost_of[case], seconds=max(cost_of[case].seconds, costs.BATCH)) if alone else cost_of[case]
 
-    return _divide((path, *group_and_cost(case)) for path, case in _by_seed(runs, lambda case: (case.study, case.seed)))
+    ordered = _by_seed(runs, lambda case: (case.study, case.seed))
+    return _divide((path, f"{case.study}_{case.model}", cost(case)) for path, case in ordered)
 
 
 def figure_batches(nodes: Mapping[str, int]) -> list[Batch]:
@@ -78,14 +75,18 @@ def figure_batches(nodes: Mapping[str, int]) -> list[Batch]:
 
     An own figure is alone, because its script may fail.
     """
-    return _divide(
-        (
-            name,
-            "figures" if figure_number(name) else f"figure_{name}",
-            replace(costs.figure_cost(0.0, n), seconds=_FIGURE),
-        )
-        for name, n in nodes.items()
-    )
+    cost_of = {name: costs.figure_cost(0.0, count) for name, count in nodes.items()}
+    return _divide((name, "figures" if figure_number(name) else f"figure_{name}", cost_of[name]) for name in nodes)
+
+
+def is_resumable(campaign: Campaign, case: RunLabels) -> bool:
+    """Return whether a run takes so long that it saves checkpoints."""
+    return MODELS[case.model].resumable and costs.is_large(campaign.grid(case.surface))
+
+
+def largest_grid(campaign: Campaign) -> int:
+    """Return the largest number of nodes along a side of the surfaces in studies."""
+    return max(map(campaign.grid, campaign.used_surfaces))
 
 
 def _by_seed(files: Mapping[str, T], labels: Callable[[T], tuple[str, int]]) -> list[tuple[str, T]]:
@@ -102,19 +103,16 @@ def _by_seed(files: Mapping[str, T], labels: Callable[[T], tuple[str, int]]) -> 
     return sorted(files.items(), key=position)
 
 
-def _large(threads: int) -> str:
-    """Return the ending of the names of batches whose jobs use several cores."""
-    return "_large" if threads > 1 else ""
-
-
 def _divide(files: Iterable[tuple[str, str, costs.Cost]]) -> list[Batch]:
-    """Divide files into batches; each file is given as path, group and expected cost."""
+    """Divide files into batches of jobs with the same cores; each file is given as path, group and expected cost."""
     groups: dict[str, list[Batch]] = {}
     for path, group, cost in files:
+        group += "_large" if cost.threads > 1 else ""
         batches, memory = groups.setdefault(group, []), int(_MARGIN * cost.memory / 1e6 + _UNEXPECTED)
         longest = costs.BATCH * (_SHORT if len(batches) <= _SHORT_BATCHES else 1)
         if not batches or batches[-1].seconds + cost.seconds > longest or len(batches[-1].files) == _MOST_FILES:
-            batches.append(Batch(f"{group}_{len(batches)}", [], 0.0, 0))
-        name, paths, seconds, most = batches[-1]
-        batches[-1] = Batch(name, [*paths, path], seconds + cost.seconds, max(most, memory))
+            batches.append(Batch(f"{group}_{len(batches)}", []))
+        name, paths, seconds, most, _, minutes = batches[-1]
+        needs = max(most, memory), cost.threads, max(minutes, cost.minutes)
+        batches[-1] = Batch(name, [*paths, path], seconds + cost.seconds, *needs)
     return [batch for batches in groups.values() for batch in batches]

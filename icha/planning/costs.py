@@ -20,8 +20,8 @@ _DOUBLE = 8
 START, WORKFLOW_MEMORY = 5.0, 310 * MiB
 # Time in s for starting a job, and memory in bytes of a job before its computation: Python and its libraries.
 JOB, JOB_MEMORY = 1.5, 130 * MiB
-# Time in s of the computation in a job that computes neither runs nor a surface.
-SHORT_JOB = 0.3
+# Time in s of the computation of another file, and of a figure.
+_SHORT, _FIGURE = 0.3, 1.6
 # Computing time in s for which a job gets a batch of short runs. A job takes `JOB` in addition.
 BATCH = 25.0
 
@@ -74,12 +74,16 @@ class Cost:
     memory : largest memory of the job, bytes.
     disk : size of the job's file, bytes.
     values : size in bytes of the values that a run adds to the campaign dataset; `disk` includes this size.
+    threads : number of cores that the job uses.
+    minutes : time limit of the job, min; many times the longest measured time.
     """
 
     seconds: float
     memory: float
     disk: float
     values: float = 0.0
+    threads: int = 1
+    minutes: int = 10
 
 
 @dataclass(frozen=True)
@@ -119,8 +123,8 @@ def is_large(grid: int) -> bool:
 
 def surface_cost(grid: int) -> Cost:
     """Return the expected cost of generating a topography with `grid` nodes along a side."""
-    heights = _DOUBLE * grid**2
-    return Cost(0.015 + 2.4e-7 * grid**2, JOB_MEMORY + 2.7 * heights, 18e3 + heights)
+    heights, threads = _DOUBLE * grid**2, 1 + is_large(grid)
+    return Cost(0.015 + 2.4e-7 * grid**2, JOB_MEMORY + 2.7 * heights, 18e3 + heights, threads=threads, minutes=30)
 
 
 def spots(summits: float, load: float) -> float:
@@ -182,8 +186,11 @@ def run_cost(
     snapshots += bool(legs)
     memory = JOB_MEMORY + 9 * MiB * (1 + bool(legs)) + size.arrays * _DOUBLE * nodes + size.summit * summits
     values = 20e3 + 57 * most * max(snapshots, 1) + 160 * steps + 20e3 * bool(legs)
+    # Boundary elements use one core on every grid.
+    threads = 1 if MODELS[model].by_cells else 1 + is_large(grid)
+    minutes = size.minutes[2 if is_large(grid) else bool(legs)]
     # Names and attributes in a file take 53 kB.
-    return Cost(seconds, memory, 53e3 + values + size.maps * nodes * snapshots, values)
+    return Cost(seconds, memory, 53e3 + values + size.maps * nodes * snapshots, values, threads, minutes)
 
 
 # Memory of a job that reads all runs, in bytes for each byte in `values`.
@@ -196,12 +203,12 @@ _DRAWING = 85 * MiB
 
 def analysis_cost(disk: float, values: float) -> Cost:
     """Return the expected cost of a file of size `disk` that is computed from runs with the `values`, bytes."""
-    return Cost(SHORT_JOB, JOB_MEMORY + _COPIES * values, disk)
+    return Cost(_SHORT, JOB_MEMORY + _COPIES * values, disk)
 
 
 def figure_cost(values: float, nodes: int) -> Cost:
     """Return the expected cost of a figure of runs with the `values`, bytes, and of a topography with `nodes` or 0."""
-    return Cost(SHORT_JOB, JOB_MEMORY + _DRAWING + MAP_ARRAYS * _DOUBLE * nodes + _COPIES * values, 400e3)
+    return Cost(_FIGURE, JOB_MEMORY + _DRAWING + MAP_ARRAYS * _DOUBLE * nodes + _COPIES * values, 400e3)
 
 
 def correction(pairs: Sequence[tuple[float, float]]) -> float:

@@ -111,7 +111,8 @@ def choose_for_study(name: str, study: Study, estimates, costs: Mapping[str, flo
     if answers[0] is None or not answers[0]["fine_seeds"].all():
         reason = f"no run has a result for {quantity}; look at the runs that ended early"
         return Choice(quantity, math.inf, required, {}, 0.0, reason)
-    left_out = _left_out(answers[0])
+    found = answers[0]["left_out"].values.tolist() if "left_out" in answers[0] else []
+    left_out = "; ".join(dict.fromkeys(filter(None, found)))
     if not _has_estimates(answers[0]):
         # Too few seeds have results. As many seeds are added as failed, and the accuracy is known afterwards.
         used = {level: int(answers[0][name].min()) for level, name in SEEDS.items()}
@@ -133,13 +134,6 @@ def choose_for_study(name: str, study: Study, estimates, costs: Mapping[str, flo
 
 def _has_estimates(answers: xr.Dataset | None) -> bool:
     return answers is not None and bool(np.isfinite(answers["estimate"]).all())
-
-
-def _left_out(answers: xr.Dataset) -> str:
-    """Return which runs the answers leave out, in words; empty if all runs are used."""
-    if "left_out" not in answers:
-        return ""
-    return "; ".join(dict.fromkeys(filter(None, answers["left_out"].values.tolist())))
 
 
 def _answers(estimate: xr.DataTree, name: str, quantity: str) -> xr.Dataset | None:

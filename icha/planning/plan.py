@@ -14,7 +14,7 @@ from icha.datasets.attributes import why_failed
 from icha.datasets.stamp import OTHER_LICENCE, difference, read_stamp
 from icha.datasets.variables.campaign import STATUS_ATTRIBUTES
 from icha.planning import costs
-from icha.planning.requirements import largest_grid, run_threads, surface_threads
+from icha.planning.batches import largest_grid
 from icha.planning.results import NEEDED, campaign_files, expected_stamps
 from icha.planning.run_costs import corrected_costs, run_costs
 from icha.support import formatting
@@ -44,7 +44,6 @@ class Item:
     state : state of the file: DONE, TO_DO, OUTDATED or FAILED.
     reason : why the file is outdated, why the run failed, or why physics ended it; otherwise empty.
     cost : expected cost of the file.
-    threads : number of cores that the job uses.
     start : share of the file in the start of its job; files that one job computes share the start.
     """
 
@@ -54,7 +53,6 @@ class Item:
     state: str
     reason: str
     cost: costs.Cost
-    threads: int = 1
     start: float = 1.0
 
     @property
@@ -70,7 +68,7 @@ class Item:
     @property
     def work(self) -> float:
         """Expected work in core-seconds, with the share of the file in the start of its job."""
-        return (self.cost.seconds + self.start * costs.JOB) * self.threads
+        return (self.cost.seconds + self.start * costs.JOB) * self.cost.threads
 
 
 def needed_for(targets: Iterable[str], items: Iterable[Item]) -> list[Item]:
@@ -100,15 +98,14 @@ def plan(campaign: Campaign, results: Path | None) -> list[Item]:
     else:  # without checksums and fingerprints, which take time
         cost_of_run, state_of = run_costs(campaign), lambda path: (TO_DO, "")
 
-    def item(part, group, path, cost, threads=1):
-        return Item(part, group, path, *state_of(path), cost, threads, min(1.0, cost.seconds / costs.BATCH))
+    def item(part, group, path, cost):
+        return Item(part, group, path, *state_of(path), cost, min(1.0, cost.seconds / costs.BATCH))
 
     for path, (name, _) in files.surfaces.items():
-        cost = costs.surface_cost(campaign.grid(name))
-        items.append(item(SURFACES, "surfaces", path, cost, surface_threads(campaign, name)))
+        items.append(item(SURFACES, "surfaces", path, costs.surface_cost(campaign.grid(name))))
     for path, case in files.runs.items():
         group = f"study {case.study}" + (f", {MODELS[case.model].words}" if case.model != DEFAULT_MODEL else "")
-        items.append(item(RUNS, group, path, cost_of_run[case], run_threads(campaign, case)))
+        items.append(item(RUNS, group, path, cost_of_run[case]))
     analysis = list(_analysis(campaign, results, items))
     items += [item(THEORIES, "theories", path, costs.analysis_cost(35e3, 0.0)) for path in files.theories]
     return items + analysis
@@ -151,7 +148,8 @@ def _analysis(campaign: Campaign, results: Path, computed: list[Item]) -> Iterat
     pictures = (path for path in files.figures if path.endswith("png"))
     for path, request in zip(pictures, campaign.figures.by_name().values(), strict=True):
         nodes = largest_grid(campaign) ** 2 if request.holds_topography else 0
-        yield item(FIGURES, path, costs.figure_cost(values, nodes))
+        cost = costs.figure_cost(values, nodes)
+        yield item(FIGURES, path, cost, cost.seconds / costs.BATCH)
     yield item(REPORT, files.report, costs.analysis_cost(700e3 + 80e3 * len(files.figures), values))
 
 

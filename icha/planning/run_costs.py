@@ -25,13 +25,17 @@ _COMPUTED = re.compile(r"^[\w-]+/(runs/\S+): computed in (\S+) s$", re.MULTILINE
 
 def run_costs(campaign: Campaign) -> dict[RunLabels, costs.Cost]:
     """Return the expected cost of each run; runs that differ only in the seed have the same cost."""
+    facts = cache(lambda surface: surface_facts(campaign, surface))
 
     @cache
-    def summits(surface):
-        # Few summits of an indenter come into contact.
-        return 1 if campaign.surfaces[surface].shape else surface_facts(campaign, surface)["summits"]
+    def cost(case):
+        # Few summits of an indenter come into contact, and its contact stays small, however sticky its roughness is.
+        flat, grid, free = campaign.is_flat(case.surface), campaign.grid(case.surface), campaign.is_free(case.surface)
+        summits = facts(case.surface)["summits"] if flat else 1
+        sweep = _cost_parameters(run_settings(campaign, case), campaign.period(case.surface))
+        ratio = energy_ratio(campaign, case) if sweep["adhesive"] and flat else math.inf
+        return costs.run_cost(case.model, grid, summits, energy_ratio=ratio, free=free, **sweep)
 
-    cost = cache(lambda case: expected_cost(campaign, case, summits(case.surface)))
     return {case: cost(case._replace(seed=0)) for case in campaign.all_runs}
 
 
@@ -48,16 +52,6 @@ def corrected_costs(campaign: Campaign, results: Path) -> dict[RunLabels, costs.
         case: replace(cost, seconds=cost.seconds * factors.get((case.study, case.model), 1.0))
         for case, cost in cost_of.items()
     }
-
-
-def expected_cost(campaign: Campaign, case: RunLabels, summits: float) -> costs.Cost:
-    """Return the expected cost of a run; `summits` is the number of summits of its surface."""
-    sweep = _cost_parameters(run_settings(campaign, case), campaign.period(case.surface))
-    # The contact of a shape stays small, however sticky its roughness is.
-    spreads = sweep["adhesive"] and campaign.surfaces[case.surface].shape is None
-    ratio = energy_ratio(campaign, case) if spreads else math.inf
-    grid, free = campaign.grid(case.surface), campaign.is_free(case.surface)
-    return costs.run_cost(case.model, grid, summits, energy_ratio=ratio, free=free, **sweep)
 
 
 def _cost_parameters(settings, side) -> dict:

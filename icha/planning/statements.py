@@ -41,38 +41,24 @@ RMS_HEIGHT, STICKY_HEIGHT = "rms_height", "sticky_rms_height"
 SHAPED, DIRECTION = "shaped", "direction"
 
 
-class Range(NamedTuple):
-    """Range of a quantity that the validation covers.
-
-    Attributes
-    ----------
-    words : name of the quantity in messages.
-    least, most : smallest and largest value.
-    """
-
-    words: str
-    least: float
-    most: float
-
-
-# Ranges of quantities in study `short_range` of campaign `validation`, rounded outwards. A test compares these ranges
-# with the campaign.
+# Ranges of quantities in study `short_range` of campaign `validation`, rounded outwards: name in messages, smallest and
+# largest value. A test compares these ranges with the campaign.
 VALIDATED = {
     # Surfaces in the validation have 1, because their amplitudes are fixed. Random amplitudes give values up to 1.2.
-    "slope_anisotropy": Range("anisotropy of slopes", 1.0, 1.2),
-    "height_skewness": Range("skewness of heights", -0.2, 0.2),
-    "height_kurtosis": Range("kurtosis of heights", 2.3, 3.5),
+    "slope_anisotropy": ("anisotropy of slopes", 1.0, 1.2),
+    "height_skewness": ("skewness of heights", -0.2, 0.2),
+    "height_kurtosis": ("kurtosis of heights", 2.3, 3.5),
     # The validation begins at 3.3. Smaller values are included, because narrow spectra have fewer unions of spots.
     # Isotropic surfaces have 1.5 or more.
-    "nayak_parameter": Range("Nayak's parameter", 1.5, 47.0),
+    "nayak_parameter": ("Nayak's parameter", 1.5, 47.0),
     # Surfaces in the validation have at most 0.005.
-    "unsupported_summits": Range("share of unsupported summits", 0.0, 0.01),
+    "unsupported_summits": ("share of unsupported summits", 0.0, 0.01),
     # Surfaces in the validation have at least 8; estimates for measured surfaces are up to 14 % too small. The upper
     # limit is infinite, because a finer grid does not increase the error.
-    "nodes_per_short_wave": Range("cells per shortest wave", 6.9, math.inf),
-    "full_contact_energy_ratio": Range("U_full/dgamma", 76.0, math.inf),
+    "nodes_per_short_wave": ("cells per shortest wave", 6.9, math.inf),
+    "full_contact_energy_ratio": ("U_full/dgamma", 76.0, math.inf),
     # 1 for a single square, 0 for a periodic surface.
-    "free_edges": Range("free edges (0 with `boundary: window`)", 0, 0),
+    "free_edges": ("free edges (0 with `boundary: window`)", 0, 0),
 }
 
 
@@ -138,8 +124,12 @@ def statements(
     sticky : surfaces and materials whose attraction outweighs repulsion, from `describe_sticky`.
     loops : cells in the length of loops by boundary elements (`icha.uncertainty.grid_error.cells_of_loops`).
     """
-    cases = list(cases)
-    found = [Statement("models", _used(models)), *_full_contact(cases)]
+    cases, studies = list(cases), {}
+    for study, names in models.items():
+        for model in names:
+            studies.setdefault(model.replace("_", " "), []).append(study)
+    used = "; ".join(f"{model} in {join_first(names)}" for model, names in studies.items())
+    found = [Statement("models", used), *_full_contact(cases)]
     if outside is not None:
         verified = f"Wu's distance is verified for Tabor parameters of {WU_HOLDS_FROM:g} and more"
         found.append(Statement("jump-in", f"{verified}; {outside or 'all runs are in this range'}", not outside))
@@ -288,15 +278,6 @@ def describe_sticky(stickiness: Mapping[tuple[str, str], float]) -> list[str]:
         for (surface, material), value in stickiness.items()
         if value > 1
     ]
-
-
-def _used(models):
-    """Return a text that lists, for each model, the studies with this model."""
-    studies: dict[str, list[str]] = {}
-    for study, names in models.items():
-        for model in names:
-            studies.setdefault(model, []).append(study)
-    return "; ".join(f"{model.replace('_', ' ')} in {join_first(names)}" for model, names in studies.items())
 
 
 def _error(adhesive):

@@ -94,56 +94,46 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
     """Return statements about the expected validity of the models; Tabor parameters are those of the mean summit."""
     facts_of = cache(lambda surface: surface_facts(campaign, surface))
     own, cases, tabor, sticky, loops = campaign.own_studies, [], {}, {}, {}
-
-    def resolved_tension(case):
-        """Return strength, largest tension that the grid resolves, and spacing, of boundary elements."""
-        if not MODELS[case.model].by_cells:
-            return {}
-        material = campaign.materials[case.material].material
-        spacing = campaign.period(case.surface) / campaign.grid(case.surface)
-        tension = straight_strength(material.receding.adhesion_length / spacing) * material.contact_modulus
-        return {STRENGTH: material.receding.interface_strength, RESOLVED: tension, SPACING: spacing}
-
     # Contacts that differ only in the seed have the same expected properties.
     for case in dict.fromkeys(case._replace(seed=0) for case in campaign.all_runs):
         if case.study not in own:
             continue  # runs whose error the estimates correct
-        value = tabor_parameter(campaign, case)
-        range_of_attraction = {} if value is None else {TABOR: value}
-        if campaign.surfaces[case.surface].smooth:
-            resolution = min(resolution_of_smooth(campaign, case), campaign.resolution(case.surface))
-            known = {"full_contact_energy_ratio": math.inf} | range_of_attraction | resolved_tension(case)
+        section, material = campaign.surfaces[case.surface], campaign.materials[case.material].material
+        spacing = campaign.period(case.surface) / campaign.grid(case.surface)
+        resolution = campaign.resolution(case.surface)
+        known = {"full_contact_energy_ratio": energy_ratio(campaign, case)}
+        if (value := tabor_parameter(campaign, case)) is not None:
+            known[TABOR] = value
+        if MODELS[case.model].by_cells:
+            tension = straight_strength(material.receding.adhesion_length / spacing) * material.contact_modulus
+            known |= {STRENGTH: material.receding.interface_strength, RESOLVED: tension, SPACING: spacing}
+        if section.smooth:
+            resolution = min(resolution_of_smooth(campaign, case), resolution)
             cases.append(Case(case.model, case.surface, case.material, known, resolution))
             continue
         facts, by_summits = facts_of(case.surface), MODELS[case.model].by_summits
-        material = campaign.materials[case.material].material
         # Only the asperity model needs surfaces that are similar to the surfaces of its validation.
-        known = (facts if by_summits else {}) | {
-            "full_contact_energy_ratio": energy_ratio(campaign, case),
+        known = (facts if by_summits else {}) | known
+        known |= {
             DIRECTION: material.receding.surface_energy / material.surface_energy if material.surface_energy else 1.0,
             SHAPED: float(campaign.surfaces[case.surface].shape is not None),
             COMPLETE_PRESSURE: facts[COMPLETE_PRESSURE] * case.rms_slope * material.contact_modulus,
             STRENGTH: material.receding.interface_strength,
             THEORETICAL: material.receding.theoretical_strength,
-            **range_of_attraction,
         }
-        section = campaign.surfaces[case.surface]
         if isinstance(section, SelfAffineSurface):
             # The sum over all waves takes time, but gives exactly the height that the study asks for.
             exact = campaign.studies[case.study].rms_heights is not None
             height = section.rms_height_at_unit_slope if exact else facts[RMS_HEIGHT]
             known[RMS_HEIGHT] = case.rms_slope * height
             known[STICKY_HEIGHT] = sticky_rms_height(section.rolloff_wavelength, material)
-        if MODELS[case.model].by_cells:
-            known |= resolved_tension(case)
-            spacing = known[SPACING]
-            # The error of loops is known for one work of adhesion only.
-            adhesive = material.surface_energy > 0 and not material.directed
-            if campaign.studies[case.study].unload and adhesive and not section.shape:
-                lengths = material.surface_energy, material.contact_modulus, rms_curvature(campaign, case), spacing
-                key = case.material, case.surface
-                loops[key] = min(float(length_in_cells(*lengths)), loops.get(key, math.inf))
-        cases.append(Case(case.model, case.surface, case.material, known, campaign.resolution(case.surface)))
+        # The error of loops is known for one work of adhesion only.
+        adhesive = material.surface_energy > 0 and not material.directed
+        if MODELS[case.model].by_cells and campaign.studies[case.study].unload and adhesive and not section.shape:
+            lengths = material.surface_energy, material.contact_modulus, rms_curvature(campaign, case), spacing
+            key = case.material, case.surface
+            loops[key] = min(float(length_in_cells(*lengths)), loops.get(key, math.inf))
+        cases.append(Case(case.model, case.surface, case.material, known, resolution))
         if by_summits and material.surface_energy > 0:
             curvature = rms_curvature(campaign, case)
             of_summit = float(material.tabor_parameter(_SUMMIT_RADIUS / curvature))

@@ -29,17 +29,8 @@ def on_cores(function: Callable, items: Iterable) -> list:
     count = min(cores(), len(items))
     if count <= 1:
         return [function(item) for item in items]
-    results, waiting = [None] * len(items), enumerate(items)
-
-    def work():
-        # Each thread takes its next item itself, because assigning many short items to threads one by one is slow.
-        for number, item in waiting:
-            results[number] = function(item)
-
     with ThreadPoolExecutor(count) as pool:
-        for done in [pool.submit(work) for _ in range(count)]:
-            done.result()
-    return results
+        return list(pool.map(function, items))
 
 
 def blocks(length: int, size: int) -> list[slice]:

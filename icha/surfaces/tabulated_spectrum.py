@@ -192,24 +192,23 @@ def read_spectrum_table(
     chosen = CONVENTIONS[convention or "surface"]
     per_length, power_unit = 1 / unit, unit ** (chosen.dimension + 2)
     if units := _units_of(words, remarks):
-        if convention is None and units.angle != "rad":
+        text, angle, stated_per_length, stated_power, exponent = units
+        if convention is None and angle != "rad":
             raise UnfitTopography(
-                f"is missing, and the titles state {units.text} without rad, so the first column may be q or f = "
+                f"is missing, and the titles state {text} without rad, so the first column may be q or f = "
                 f"q/(2 pi); expected one of {', '.join(CONVENTIONS)}",
                 "convention",
             )
         excluded = "rad" if chosen.wave_factor > 1 else "cycles"
-        if units.angle == excluded or units.exponent not in (None, chosen.dimension + 2):
+        if angle == excluded or exponent not in (None, chosen.dimension + 2):
             raise UnfitTopography(
-                f"is {convention or 'missing'}, but the titles state {units.text}; expected another of "
+                f"is {convention or 'missing'}, but the titles state {text}; expected another of "
                 f"{', '.join(CONVENTIONS)}",
                 "convention",
             )
-        stated = units.per_length, units.power or units.per_length ** -(chosen.dimension + 2)
+        stated = stated_per_length, stated_power or stated_per_length ** -(chosen.dimension + 2)
         if length_unit and not np.allclose(stated, [per_length, power_unit], rtol=1e-6, atol=0):
-            raise UnfitTopography(
-                f"does not agree with the titles, which state {units.text}. Remove the key", "length_unit"
-            )
+            raise UnfitTopography(f"does not agree with the titles, which state {text}. Remove the key", "length_unit")
         per_length, power_unit = stated
     else:
         for line in (*remarks, *(" ".join(row) for _, row in words)):
@@ -232,32 +231,18 @@ def read_spectrum_table(
     return SpectrumTable(q, power, tuple(line for line in remarks if line.startswith(("scan", "profiles"))), height)
 
 
-class _Units(NamedTuple):
-    """Units in the titles of a table.
-
-    Attributes
-    ----------
-    per_length : unit of the first column, 1/m.
-    angle : "rad", "cycles", or "" if the unit of the first column contains neither.
-    power, exponent : unit of the second column, m^exponent; None if the titles do not contain it.
-    text : units as in the file.
-    """
-
-    per_length: float
-    angle: str
-    power: float | None
-    exponent: int | None
-    text: str
-
-
 _ANGLE = re.compile(r"(rad(?:ians?)?\b)|((?:cycles?|lines?)\b)")
 # A line with a unit of all columns, such as `units: nm`.
 _NAMED_UNIT = re.compile(r"\bunits?\b(?:[^:=]*[:=]|\s+of)\s*([^\s,;]+)", re.IGNORECASE)
 _WAVELENGTH = re.compile(r"\W*(?:wave\s?length|lambda|λ)", re.IGNORECASE)
 
 
-def _units_of(words, remarks) -> _Units | None:
-    """Return the units in the titles above the numbers; None if there are none. Raises ValueError for other titles."""
+def _units_of(words, remarks) -> tuple[str, str, float, float | None, int | None] | None:
+    """Return the units in the titles above the numbers; None if there are none. Raises ValueError for other titles.
+
+    The units are: their text; "rad", "cycles" or "" for the angle in the first unit; the first unit, 1/m; the second
+    unit and its power of m, which are None if the titles do not state it.
+    """
     for row in [*(row for _, row in reversed(words)), *(remark.split() for remark in remarks[-1:])]:
         line = " ".join(row)
         if problem := problem_with_numbers(re.sub(r"2\s*[*·]?\s*(?:pi|π)", "", line), "Pa", "Pa"):
@@ -274,7 +259,7 @@ def _units_of(words, remarks) -> _Units | None:
         if first is not None and first[1] == -1 and None not in others:
             angle = next(("rad" if rad else "cycles" for rad, _ in _ANGLE.findall(texts[0])), "")
             power, exponent = others[0] if others and others[0] else (None, None)
-            return _Units(first[0], angle, power, exponent, " and ".join(texts))
+            return " and ".join(texts), angle, first[0], power, exponent
         if _WAVELENGTH.match(line) or (first is not None and first[1] == 1 and texts is not row):
             raise ValueError(
                 f"has the titles {line[:60]!r}, so the first column looks like a wavelength; expected wave numbers, "

@@ -7,11 +7,11 @@ from conftest import REPOSITORY
 from demo_configuration import file_surface, measured_surface
 
 from icha.configuration.load import load_configuration
-from icha.planning.batches import figure_batches, run_batches
+from icha.planning.batches import figure_batches, is_resumable, run_batches
 from icha.planning.costs import BATCH, JOB, START, WORKFLOW_MEMORY, Cost
 from icha.planning.plan import DONE, RUNS, TO_DO, Item, find_shortages, memory_on, needed_for, plan, time_on
-from icha.planning.requirements import is_resumable, run_threads
 from icha.planning.results import campaign_files, needed_files
+from icha.planning.run_costs import run_costs
 from icha.planning.validity import surface_facts
 from icha.surfaces.measured.topography import prepared_topography
 from icha.surfaces.summits import find_summits
@@ -155,7 +155,7 @@ def test_a_lack_of_memory_or_disk_space_is_reported(monkeypatch, tmp_path):
 def test_boundary_elements_use_one_core_and_save_checkpoints_on_large_grids(read):
     both = {"studies.one.models": ["asperities", "boundary_elements"]}
     campaign = read(ROUGH | both | {"surfaces.rough.grid": 2048})
-    threads = {case.model: run_threads(campaign, case) for case in campaign_files(campaign).runs.values()}
+    threads = {case.model: cost.threads for case, cost in run_costs(campaign).items()}
     resumable = {case.model: is_resumable(campaign, case) for case in campaign_files(campaign).runs.values()}
     assert threads == {"asperities": 2, "boundary_elements": 1}
     assert resumable == {"asperities": False, "boundary_elements": True}

@@ -12,8 +12,7 @@ import prepare
 from icha.configuration.cases import adhesive_contacts, run_settings, surface_settings
 from icha.configuration.load import collect_inputs
 from icha.datasets.results import SURFACE
-from icha.planning.batches import run_batches, surface_batches, theory_batches
-from icha.planning.requirements import is_resumable
+from icha.planning.batches import is_resumable, run_batches, surface_batches, theory_batches
 from icha.planning.results import campaign_files, expected_stamps, needed_files
 from icha.support.checksums import LongList, sha256_of
 from icha.support.fingerprint import fingerprint

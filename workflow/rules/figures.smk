@@ -5,8 +5,7 @@
 from icha.configuration.figures import drawing
 from icha.datasets.results import FIGURE, FIGURE_ENDINGS, ResultFiles
 from icha.figures.registry import module_name
-from icha.planning.batches import figure_batches
-from icha.planning.requirements import largest_grid
+from icha.planning.batches import figure_batches, largest_grid
 from icha.support.scripts import modules_of
 
 FIGURES = CAMPAIGN.figures.by_name()
@@ -56,7 +55,7 @@ for batch in figure_batches(NODES):
             "../envs/icha.yaml"
         resources:
             mem_mb=batch.memory,
-            runtime=10,
+            runtime=batch.minutes,
         params:
             figures=as_it_is(LongList(DRAWINGS[name] for name in batch.files)),
             # These files are compared by content, not by time.

@@ -3,36 +3,31 @@
 
 from itertools import chain
 
-from icha.planning.requirements import run_minutes, run_threads, surface_threads
-
 
 def surface_rules():
-    """Yield name of the rule, folder, batch, inputs, function for arguments, cores and time limit."""
+    """Yield name of the rule, folder, batch, inputs and function for arguments."""
     for batch in surface_batches(CAMPAIGN, FILES.surfaces):
         names = dict.fromkeys(FILES.surfaces[path][0] for path in batch.files)
         # Files of the user are compared by content, not by time, because the stamp contains their checksums.
         files = ancient([CAMPAIGN.surfaces[name].path for name in names if CAMPAIGN.surfaces[name].from_file])
-        cores = max(surface_threads(CAMPAIGN, name) for name in names)
-        yield f"make_{batch.name}", "surfaces", batch, files, surface_arguments, cores, 30
+        yield f"make_{batch.name}", "surfaces", batch, files, surface_arguments
 
 
 def theory_rules():
     """Yield the same for batches of theories."""
     for batch in theory_batches(FILES.theories):
         surfaces = surfaces_for({path: FIRST_SURFACES[FILES.theories[path]] for path in batch.files})
-        yield f"compute_{batch.name}", "references", batch, surfaces, theory_arguments, 1, 10
+        yield f"compute_{batch.name}", "references", batch, surfaces, theory_arguments
 
 
 def run_rules():
     """Yield the same for batches of runs."""
     for batch in run_batches(CAMPAIGN, FILES.runs):
-        cases = {FILES.runs[path]._replace(seed=0) for path in batch.files}
         surfaces = surfaces_for({path: surface_of(FILES.runs[path]) for path in batch.files})
-        needs = [max(need(CAMPAIGN, case) for case in cases) for need in (run_threads, run_minutes)]
-        yield f"run_{batch.name}", "runs", batch, surfaces, run_arguments, *needs
+        yield f"run_{batch.name}", "runs", batch, surfaces, run_arguments
 
 
-for name, folder, batch, inputs, arguments, cores, minutes in chain(surface_rules(), theory_rules(), run_rules()):
+for name, folder, batch, inputs, arguments in chain(surface_rules(), theory_rules(), run_rules()):
 
     rule:
         name:
@@ -50,10 +45,10 @@ for name, folder, batch, inputs, arguments, cores, minutes in chain(surface_rule
         priority: int(batch.seconds) if folder == "runs" else 0
         conda:
             "../envs/icha.yaml"
-        threads: cores
+        threads: batch.threads
         resources:
             mem_mb=batch.memory,
-            runtime=minutes,
+            runtime=batch.minutes,
         params:
             files=as_it_is(LongList(map(arguments, batch.files))),
             kind=folder,
