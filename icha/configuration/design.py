@@ -24,7 +24,7 @@ from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
 from icha.datasets.labels import RunLabels, coarse_study, inputs_study, is_derived_study, number_label
 from icha.path.targets import ESTIMATED_AT_TARGETS, ESTIMATED_OF_LOOPS
 from icha.support.units import PREFIXES
-from icha.support.values import LONGEST_LABEL, NOTHING, Folders, Problem, list_names, rule_of
+from icha.support.values import LONGEST_LABEL, NOTHING, Folders, Problem, list_names
 
 MAX_RUNS = 100_000
 # Largest number of targets of all runs together.
@@ -339,14 +339,14 @@ def value_label(section, name: str) -> str:
         text = str(value)
         # If a text cannot be part of a file name, such as the name of a channel, its checksum is used instead.
         return text if re.fullmatch(r"[A-Za-z0-9_.+-]{1,40}", text) else hashlib.sha256(text.encode()).hexdigest()[:8]
-    rule = rule_of(type(section).model_fields[name])
-    if rule is None or rule.unit == "1":
+    unit = RULES[name].unit if name in RULES else "1"
+    if unit == "1":
         return number_label(value)
     exact = Decimal(repr(value))
     power = 3 * (exact.adjusted() // 3) if exact else 0
     power = min(max(power, min(PREFIXES)), max(PREFIXES))
     digits = format(exact.scaleb(-power).normalize(), "f")
-    return f"{digits}{PREFIXES[power].replace('µ', 'u')}{rule.unit.split('/')[0]}"
+    return f"{digits}{PREFIXES[power].replace('µ', 'u')}{unit.split('/')[0]}"
 
 
 def varied_values(campaign: Campaign) -> dict[str, dict[str, tuple[str, str, dict]]]:
@@ -362,8 +362,7 @@ def varied_values(campaign: Campaign) -> dict[str, dict[str, tuple[str, str, dic
             entries = campaign.materials if of_material else campaign.surfaces
             shown = study.materials if of_material else study.surfaces
             values = {each: getattr(entries[each], name, None) for each in shown}
-            unit = next((unit for each in shown if (unit := unit_of(entries[each], name))), "1")
-            found.setdefault(label, {})[name] = "material" if of_material else "surface", unit, values
+            found.setdefault(label, {})[name] = "material" if of_material else "surface", _unit_in_cf(name), values
     return found
 
 
@@ -381,19 +380,13 @@ def sampled_parameters(campaign: Campaign) -> dict[str, tuple[list[tuple], dict[
         found[label] = (
             list(dict.fromkeys(cases)),
             {
-                name: (_unit_in_cf(RULES[name]), *distribution, [case[name] for case in values])
+                name: (_unit_in_cf(name), *distribution, [case[name] for case in values])
                 for name, distribution in study.sample.distributions.items()
             },
         )
     return found
 
 
-def unit_of(section, name: str) -> str:
-    """Return the SI unit of a key of a section, in the notation of CF; "" for a key without a unit."""
-    field = type(section).model_fields.get(name)
-    rule = rule_of(field) if field else None
-    return _unit_in_cf(rule) if rule else ""
-
-
-def _unit_in_cf(rule):
-    return rule.unit.replace("/m^2", " m^-2")
+def _unit_in_cf(name):
+    """Return the SI unit of a parameter in the notation of CF."""
+    return RULES[name].unit.replace("/m^2", " m^-2") if name in RULES else "1"
