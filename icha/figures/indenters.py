@@ -39,6 +39,9 @@ from icha.support.tables import read_columns
 # Look of measured points; measurements differ in their marker.
 _MEASURED = {"ls": "none", "ms": 3.6, "mew": 0.8, "color": BLACK, "zorder": 5}
 _CROSSES = "x+1234"
+_FITS = """Where a fit is missing, the Tabor parameter of the sphere is below 3, the value from which JKR holds; there
+are fewer than three states; or the contact is so small that Hertz's law without adhesion fits better. Runs without
+adhesion, on shapes without a radius, and on layers are left out."""
 
 
 class Series(NamedTuple):
@@ -148,19 +151,6 @@ def read_measured(
             sources.append(f"{known['label']} ({known['citation']})")
     say(figure, f"Crosses are measurements: {'; '.join(sources)}." if sources else "")
     return found
-
-
-def _only_spheres(study):
-    """Return why fits of JKR may be missing, and which runs a figure of spheres with adhesion leaves out, if any."""
-    words = [
-        """Where a fit is missing, the Tabor parameter of the sphere is below 3, the value from which JKR holds; there
-        are fewer than three states; or the contact is so small that Hertz's law without adhesion fits better."""
-    ]
-    if "shape_radius" not in study or study["shape_radius"].isnull().any() or select.has_layer(study):
-        words.append("Runs on shapes without a radius, and runs on layers, are left out.")
-    if (study["surface_energy"] == 0).any():
-        words.append("Runs without adhesion are left out.")
-    return " ".join(words)
 
 
 # --- figure 17 ---
@@ -300,7 +290,7 @@ def jkr_plot(
                 drawn.append((branch, each, labels, run, x[inside], y[inside]))
     scale, unit = choose_unit(max(float(np.abs(x).max(initial=0.0)) for *_, x, _ in drawn), "N")
     fig, [panels] = new_panels(3.0, sharex=True, sharey=True)
-    say(fig, _LINE, _only_spheres(campaign[study].to_dataset()))
+    say(fig, _LINE, _FITS)
     for branch, each, labels, run, x, y in drawn:
         ax = panels[list(_TITLES).index(branch)]
         plot(ax, x * scale, y * 1e3, Name("states", labels), marker=_TITLES[branch][1], mec=each.colour, **_STATES)
@@ -391,7 +381,7 @@ def work_of_adhesion(
     colours = dict(zip(contacts, distinct_colours(len(contacts)), strict=True))
     fig = new_figure(1.25 * ONE_COLUMN, 2.9)
     ax = fig.subplots()
-    say(fig, _WORK, _only_spheres(campaign[study].to_dataset()))
+    say(fig, _WORK, _FITS)
     handles = {name: legend_handle(color=colour, lw=4) for name, colour in colours.items() if name}
     for (quantity, (name, marker, own, unit_of_work)), contact in itertools.product(_WORKS.items(), contacts):
         # Colours distinguish the quantities, or surfaces and materials if there are several.
