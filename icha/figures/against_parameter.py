@@ -118,7 +118,11 @@ def _shade_unverified(ax, smallest):
 def _pull_off_of_spheres(runs):
     """Draw pull-off force and loss of smooth spheres against the Tabor parameter, with the limits of JKR and DMT."""
     runs = sorted(runs, key=lambda run: float(run["tabor_parameter"]))
-    at, pull_off, loss = np.array([_values_of_sphere(run) for run in runs]).T
+    names = ("tabor_parameter", "pull_off_force", "hysteresis_loss", "surface_energy", "shape_radius")
+    names += ("contact_modulus", "period")
+    at, force, loss, energy, R, modulus, side = np.array([[float(run[name]) for name in names] for run in runs]).T
+    pull_off = force / (np.pi * energy * R)
+    loss *= side**2 / np.cbrt(energy**5 * R**4 / modulus**2)
     resolved = np.array([run.attrs.get("attraction") == FINITE_RANGE for run in runs])
     fig, [panels] = new_panels(3.1)
     say(
@@ -143,14 +147,6 @@ def _pull_off_of_spheres(runs):
     panels[1].set_ylabel(r"loss$\,/\,(\Delta\gamma^5 R^4/E^{*2})^{1/3}$")
     legend_below(fig, {})
     return fig
-
-
-def _values_of_sphere(run):
-    """Return Tabor parameter, pull-off force over pi dgamma R, and loss over (dgamma^5 R^4/E*^2)^(1/3)."""
-    energy, R, modulus = (float(run[name]) for name in ("surface_energy", "shape_radius", "contact_modulus"))
-    loss = float(run["hysteresis_loss"]) * float(run["period"]) ** 2
-    unit = np.cbrt(energy**5 * R**4 / modulus**2)
-    return float(run["tabor_parameter"]), float(run["pull_off_force"]) / (np.pi * energy * R), loss / unit
 
 
 # --- figure 14 ---

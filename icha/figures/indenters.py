@@ -105,7 +105,7 @@ def _roughness(group):
 
 def has_radius(run: xr.Dataset) -> bool:
     """Return True if a run can be compared with a sphere: its shape has a radius, and the half-space no layer."""
-    return "shape_radius" in run and not np.isfinite(run["layer_thickness"])
+    return "shape_radius" in run and not select.has_layer(run)
 
 
 class Measured(NamedTuple):

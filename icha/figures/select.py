@@ -171,9 +171,7 @@ def has_shape(study: xr.Dataset) -> bool:
 
 def has_layer(study: xr.Dataset) -> bool:
     """Return whether a run of a study is on a layer of finite thickness."""
-    thickness, compression = study.get("layer_thickness"), study.get("layer_compression")
-    free = thickness is not None and bool(np.isfinite(thickness).any())
-    return free or (compression is not None and bool((np.abs(compression) > 0).any()))
+    return "layer_thickness" in study and bool(np.isfinite(study["layer_thickness"]).any())
 
 
 def doubt_about(run: xr.Dataset) -> str:
