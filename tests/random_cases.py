@@ -28,56 +28,15 @@ def _waves(rng, grid, exponent, kx=1.0, ky=1.0):
     return field / field.std()
 
 
-def _rough(rng, grid, size):
-    return _waves(rng, grid, 1 + size)
-
-
-def _noise(rng, grid, size):
-    return rng.normal(size=(grid, grid))
-
-
-def _anisotropic(rng, grid, size):
-    return _waves(rng, grid, 2.0, kx=1 + 5 * size, ky=1.0)
-
-
-def _plateau(rng, grid, size):
-    """Summits cut off at the same height."""
-    return np.minimum(_waves(rng, grid, 1.8), 1.5 - 2 * size)
-
-
-def _undulation(rng, grid, size):
-    """Roughness on a wave that is much higher than it."""
-    x = 2 * np.pi * np.arange(grid) / grid
-    return _waves(rng, grid, 1.8) + 30 * size * (np.cos(x)[:, None] + np.cos(x))
-
-
-def _pit(rng, grid, size):
-    heights = _waves(rng, grid, 1.8)
-    heights[tuple(rng.integers(grid, size=2))] -= 100 * size
-    return heights
-
-
-def _spike(rng, grid, size):
-    heights = _waves(rng, grid, 1.8)
-    heights[tuple(rng.integers(grid, size=2))] += 100 * size
-    return heights
-
-
-def _step(rng, grid, size):
-    heights = _waves(rng, grid, 1.8)
-    heights[: grid // 2] += 20 * size
-    return heights
-
-
-def _lattice(rng, grid, size):
-    """Equal summits in equal distances: everything happens to all of them at once."""
-    x = 2 * np.pi * np.arange(grid) / grid * int(1 + 3 * size)
+def _cosines(grid, waves=1):
+    x = 2 * np.pi * np.arange(grid) / grid * waves
     return np.cos(x)[:, None] + np.cos(x)
 
 
-def _ridges(rng, grid, size):
-    """No summits."""
-    return np.cos(2 * np.pi * np.arange(grid) / grid)[:, None] * np.ones(grid)
+def _with_a_point(rng, grid, height):
+    heights = _waves(rng, grid, 1.8)
+    heights[tuple(rng.integers(grid, size=2))] += height
+    return heights
 
 
 def _bump(rng, grid, size):
@@ -86,8 +45,24 @@ def _bump(rng, grid, size):
     return np.maximum(0.1 - x[:, None] ** 2 - x**2, 0.0)
 
 
-_ALL = (_rough, _noise, _anisotropic, _plateau, _undulation, _pit, _spike, _step, _lattice, _bump, _ridges)
-SHAPES = {function.__name__.strip("_"): function for function in _ALL}
+# Functions of random numbers, the grid, and a size from 0 to 1.
+SHAPES = {
+    "rough": lambda rng, grid, size: _waves(rng, grid, 1 + size),
+    "noise": lambda rng, grid, size: rng.normal(size=(grid, grid)),
+    "anisotropic": lambda rng, grid, size: _waves(rng, grid, 2.0, kx=1 + 5 * size, ky=1.0),
+    # Summits cut off at the same height.
+    "plateau": lambda rng, grid, size: np.minimum(_waves(rng, grid, 1.8), 1.5 - 2 * size),
+    # Roughness on a wave that is much higher than it.
+    "undulation": lambda rng, grid, size: _waves(rng, grid, 1.8) + 30 * size * _cosines(grid),
+    "pit": lambda rng, grid, size: _with_a_point(rng, grid, -100 * size),
+    "spike": lambda rng, grid, size: _with_a_point(rng, grid, 100 * size),
+    "step": lambda rng, grid, size: _waves(rng, grid, 1.8) + 20 * size * (np.arange(grid) < grid // 2)[:, None],
+    # Equal summits in equal distances: everything happens to all of them at once.
+    "lattice": lambda rng, grid, size: _cosines(grid, int(1 + 3 * size)),
+    "bump": _bump,
+    # No summits.
+    "ridges": lambda rng, grid, size: np.cos(2 * np.pi * np.arange(grid) / grid)[:, None] * np.ones(grid),
+}
 
 
 @dataclass(frozen=True)

@@ -49,15 +49,6 @@ def lost_lines(heights, random):
     return heights
 
 
-def clipping(heights, random):
-    return np.minimum(heights, np.quantile(heights, random.choice([0.5, 0.8, 0.95, 0.99])))
-
-
-def quantisation(heights, random):
-    step = random.choice([0.05, 0.2, 0.5, 1.0])
-    return np.round(heights / step) * step
-
-
 def plateaus(heights, random):
     for _ in range(random.choice([1, 4, 10])):
         (row, column), width = random.integers(0, GRID - 8, 2), random.integers(2, 8)
@@ -70,7 +61,13 @@ def terraces(heights, random):
     return heights + random.choice([2, 5, 12]) * (np.add.outer(*waves) > 0)
 
 
-DAMAGES = (nothing, steps, pits, spikes, lost_lines, clipping, quantisation, plateaus, terraces)
+DAMAGES = (
+    *(nothing, steps, pits, spikes, lost_lines),
+    # Clipping and quantisation.
+    lambda heights, random: np.minimum(heights, np.quantile(heights, random.choice([0.5, 0.8, 0.95, 0.99]))),
+    lambda heights, random: np.round(heights / (step := random.choice([0.05, 0.2, 0.5, 1.0]))) * step,
+    *(plateaus, terraces),
+)
 
 
 def damaged(number: int) -> tuple[Surface, bool]:

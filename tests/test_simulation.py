@@ -16,7 +16,6 @@ from icha import (
     ConvergenceError,
     IchaWarning,
     Material,
-    Paraboloid,
     Path,
     SelfAffineSpectrum,
     Sphere,
@@ -140,17 +139,6 @@ def test_a_surface_that_pulls_itself_together_is_reported_with_what_was_computed
     assert digest(again.dataset) == digest(data)
 
 
-def test_nothing_reached_is_an_empty_dataset_not_a_wrong_one(monkeypatch):
-    import icha.equilibrium.solver
-
-    monkeypatch.setattr(icha.equilibrium.solver, "_MAX_NEWTON_STEPS", 0)
-    with pytest.raises(ConvergenceError, match="after 0 of 3 stops") as caught:
-        run_of(rough(), BARE)
-    assert caught.value.dataset.sizes["step"] == 0
-    assert caught.value.dataset.sizes["spot"] == 0
-    assert float(caught.value.dataset.contact_modulus) == MODULUS
-
-
 def test_a_snapshot_that_is_not_finite_ends_a_cycle_with_what_was_reached(monkeypatch):
     from icha.equilibrium.interacting_asperities import AsperityObservables
 
@@ -218,19 +206,6 @@ def test_snapshots_at_states_of_the_last_unloading(model):
 def test_a_model_that_is_not_applicable_gives_a_warning():
     with pytest.warns(IchaWarning, match="asperity model not applicable: mean gap of 0.2 rms heights"):
         simulate(rough(), Material(1e6, 0.0), Path(mean_separations=[0.2 * rough().rms_height]))
-
-
-def test_a_smooth_sphere_pulls_off_as_jkr_says_also_if_an_area_lies_inside_its_jump():
-    modulus, radius, cell, grid = 1e6, 1e-3, 1e-6, 64
-    # The unit of radii, (dgamma R^2/E*)^(1/3), is five cells.
-    energy = (5 * cell) ** 3 * modulus / radius**2
-    surface = Surface(np.zeros((grid, grid)), grid * cell, "free", Paraboloid((radius, radius)))
-    path = Path(area_fractions=[0.05, 0.08], unload=True)
-    run = simulate(surface, Material(modulus, energy, 1e-12), path, model="boundary_elements")
-    assert "failed_checks" not in run.attrs
-    assert run.branch.values[1] == "loading" and float(run.contact_area_fraction[1]) > 0.05
-    force = run.nominal_pressure * surface.period**2
-    assert -float(force.min()) == pytest.approx(1.5 * np.pi * energy * radius, rel=5e-3)
 
 
 def test_a_run_ends_where_the_contact_of_a_shape_reaches_the_edge_of_its_square():

@@ -78,11 +78,6 @@ def no_snakemake(monkeypatch):
 
 
 @pytest.fixture
-def small_machine(monkeypatch, no_snakemake):
-    monkeypatch.setattr("icha.planning.plan.memory_of_machine", lambda: 2**20)
-
-
-@pytest.fixture
 def empty_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     return tmp_path
@@ -202,20 +197,15 @@ def test_a_text_is_shown_and_what_is_missing_is_asked(project):
     assert yaml.safe_load((CAMPAIGNS / "four.yaml").read_text())["surfaces"]["cloud"]["scattered"] is None
 
 
-def write_scan(file, heights, side):
-    """Write a scan as Gwyddion exports it: with size and units."""
-    heading = ["# Channel: Z", f"# Width: {side}", f"# Height: {side}", "# Value units: m"]
-    rows = [" ".join(f"{height:.8e}" for height in row) for row in heights]
-    Path(file).write_text("\n".join([*heading, *rows]) + "\n")
-
-
 def rough_heights(noise=0.0, grid=64, side=10e-6):
     heights = SelfAffineSpectrum(side, side, side / 8, 0.8, rms_slope=0.1).realise(grid, 1).heights
     return heights + noise * np.random.default_rng(1).normal(size=heights.shape)
 
 
 def test_a_scan_is_analysed_before_anything_is_computed(project):
-    write_scan("scan.txt", rough_heights(noise=20e-9), "10 um")
+    # As Gwyddion exports it: with size and units.
+    heading = "Channel: Z\nWidth: 10 um\nHeight: 10 um\nValue units: m"
+    np.savetxt("scan.txt", rough_heights(noise=20e-9), "%.8e", header=heading)
     written = output("new", "mine", "--measured", "scan.txt", "--boundary-elements")
     assert "scan: read as matrix, all points have a height\n" in written
     assert re.search(r"^scan: \d+ rows x \d+ columns of points; pixels of \S+ \S+ x ", written, re.MULTILINE)
@@ -352,7 +342,8 @@ def test_results_of_another_file_of_the_same_name_are_not_changed(tiny, no_snake
     output("run", "copy.yaml", status=STARTED)
 
 
-def test_a_campaign_too_large_for_the_machine_causes_a_warning(tiny, small_machine):
+def test_a_campaign_too_large_for_the_machine_causes_a_warning(tiny, no_snakemake, monkeypatch):
+    monkeypatch.setattr("icha.planning.plan.memory_of_machine", lambda: 2**20)
     assert "Warning: jobs on 2 cores need about" in printed("run", "tiny.yaml", status=STARTED)
     described = output("describe", "tiny.yaml")
     assert "too small: jobs on 2 cores need about" in described and "this machine has 1.05 MB" in described

@@ -25,13 +25,9 @@ USUAL = {
 }
 
 
-def key_of(place):
-    return place.rstrip(".01")
-
-
 @pytest.mark.parametrize(("place", "value"), [(place, value) for place, values in UNUSUAL.items() for value in values])
 def test_unusual_values_are_refused_until_they_are_confirmed(place, value, load, refused, tmp_path):
-    key = key_of(place)
+    key = place.rstrip(".01")
     refused(place, value, f": {value!r} is unusual; expected ")
     refused(place, value, f"Correct the value, or add `confirmed: [{key}]` at the top level if you intend this value")
     configuration = load({**ANY_STICKINESS, place: value, "confirmed": list({key, RANGE})})

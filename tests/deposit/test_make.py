@@ -42,6 +42,8 @@ def files_of(folder):
 
 def test_a_deposit_has_everything_and_nothing_else(smoke):
     present = files_of(smoke / DEPOSIT)
+    assert problems_with(smoke / DEPOSIT) == []
+    subprocess.run(["sha256sum", "--quiet", "--check", "--strict", CHECKSUMS], cwd=smoke / DEPOSIT, check=True)
     assert {path.split("/")[0] for path in present} == {
         *("README.md", "CITATION.cff", ".zenodo.json", "ro-crate-metadata.json"),
         *("data_dictionary.csv", "SHA256SUMS", "config.used.yaml", "inputs", "dataset", "aggregated", "runs"),

@@ -95,20 +95,15 @@ def written(folder, publication):
     return folder
 
 
-def entities_of(folder):
-    graph = json.loads((folder / CRATE).read_bytes())["@graph"]
-    entities = {entity["@id"]: entity for entity in graph}
-    assert len(entities) == len(graph)
-    return entities
-
-
 def references(value):
     """Identifiers that a property names."""
     return [unquote(entry["@id"]) for entry in (value if isinstance(value, list) else [value]) if "@id" in entry]
 
 
 def test_the_crate_states_files_origin_authors_and_licence(tmp_path):
-    entities = entities_of(written(tmp_path, ALL))
+    graph = json.loads((written(tmp_path, ALL) / CRATE).read_bytes())["@graph"]
+    entities = {entity["@id"]: entity for entity in graph}
+    assert len(entities) == len(graph)
     for entity in entities.values():
         for value in entity.values():
             for name in references(value):

@@ -58,18 +58,12 @@ def test_nodes_of_coarse_and_fine_grids_against_the_direct_image_sum(energy, n):
         assert field[row, column] == pytest.approx(expected, abs=1e-6 * np.max(np.abs(field)))
 
 
-def many_spots():
-    """Spots of very different sizes, many of them: several groups, in a field of several blocks of rows."""
-    rng = np.random.default_rng(6)
-    a = 10 ** rng.uniform(-3.5, -1.6, 200)
-    return rng.random((200, 2)), a, rng.uniform(0.5, 2, 200) * a / 0.2
-
-
 @pytest.mark.parametrize("energy", ENERGIES)
 def test_large_and_small_spots_together_are_the_sum_of_each_alone(energy):
-    # Alone, a spot's Fourier series and window are others than among two hundred.
-    centres, a, R = many_spots()
-    n = 96
+    # Alone, a spot's Fourier series and window are others than among two hundred of very different sizes.
+    rng, n = np.random.default_rng(6), 96
+    a = 10 ** rng.uniform(-3.5, -1.6, 200)
+    centres, R = rng.random((200, 2)), rng.uniform(0.5, 2, 200) * a / 0.2
     together = displacement_field(law(energy), 1.0, n, centres, a, R)
     alone = sum(displacement_field(law(energy), 1.0, n, centres[[j]], a[[j]], R[[j]]) for j in range(len(a)))
     np.testing.assert_allclose(together, alone, rtol=0, atol=3e-8 * np.max(np.abs(alone)))

@@ -55,18 +55,16 @@ def test_states_where_the_edge_stands_are_not_of_the_receding_work():
     unit = float(closed.sphere_pull_off(RADIUS, MODULUS, ENERGY).contact_radius)
     into = closed.sphere_contact(unit * np.linspace(1.5, 4, 40), RADIUS, MODULUS, 0.3 * ENERGY)
     # A punch between both works, then JKR with the receding one.
-    stands = [closed.sphere_contact(4 * unit, RADIUS, MODULUS, part * ENERGY) for part in np.linspace(0.3, 1, 20)]
+    stands = [
+        closed.sphere_contact(np.array([4 * unit]), RADIUS, MODULUS, part * ENERGY) for part in np.linspace(0.3, 1, 20)
+    ]
     out = closed.sphere_contact(unit * np.linspace(3.99, 0.9, 400), RADIUS, MODULUS, ENERGY)
-    rows = [*rows_of(into, 0), *(rows_of(each, 1)[0] for each in map(_single, stands)), *rows_of(out, 1, 1e-3)]
+    rows = [*rows_of(into, 0), *(rows_of(each, 1)[0] for each in stands), *rows_of(out, 1, 1e-3)]
     loop = {"pull_off_pressure": 1.0, "hysteresis_loss": 0.003, "largest_contact_area_fraction": 0.2}
     material = icha.Material(MODULUS, (0.3 * ENERGY, ENERGY), 1e-9)
     values = loop_values(rows, loop, SMOOTH, material)
     assert values["work_of_adhesion_approach"] == pytest.approx(0.3 * ENERGY, rel=1e-5)
     assert values["work_of_adhesion_retraction"] == pytest.approx(ENERGY, rel=1e-5)
-
-
-def _single(state):
-    return type(state)(*(np.atleast_1d(each) for each in state))
 
 
 def test_values_that_are_not_defined_are_left_out():

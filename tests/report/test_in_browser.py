@@ -145,10 +145,6 @@ def test_spots_have_the_positions_of_the_dataset(page):
     assert red_fraction == pytest.approx(sum(np.pi * radius**2 for *_, radius in circles) / 1e6, rel=0.25)
 
 
-def brightness(colour):
-    return sum(map(int, re.findall(r"\d+", colour)[:3])) / 3
-
-
 @pytest.mark.parametrize("width", [320, 700])
 def test_nothing_is_wider_than_the_window(page, width):
     page.show(width, 800)
@@ -169,7 +165,7 @@ def test_the_report_is_readable_on_a_telephone_in_the_dark_and_on_paper(report):
         report.show(700 if medium else 400, scheme=scheme, medium=medium)
         assert report.value("document.documentElement.scrollWidth <= innerWidth")
         assert report.value("[...document.images].every((image) => image.complete && image.width > 300)")
-        paper, ink = map(brightness, report.value(colours))
+        paper, ink = (sum(map(int, re.findall(r"\d+", each)[:3])) / 3 for each in report.value(colours))
         contrasts.append(paper - ink)
     light, dark, printed = contrasts
     assert light > 150 and dark < -150 and printed > 150
