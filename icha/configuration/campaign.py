@@ -281,13 +281,15 @@ class Campaign(Section):
                 yield ("models", index), label, reason
         for name, label in itertools.product(study.surfaces, study.materials):
             thickness, known = self.materials[label].thickness, self._grid_and_period(name)
-            if (places := self.materials[label].adhesion_map) and hasattr(known, "grid"):
+            if not (hasattr(known, "grid") and hasattr(known, "period")):
+                continue  # the file is not read yet
+            if places := self.materials[label].adhesion_map:
                 try:
                     places.field.on_nodes(known.grid, known.period, periodic=not self.is_free(name))
                 except ValueError as error:
                     reason = f"contains {label!r}, whose work of adhesion does not fit the surface {name!r}: {error}"
                     yield ("materials",), study.materials, reason
-            if thickness and self.is_free(name) and hasattr(known, "grid") and thickness < known.period / known.grid:
+            if thickness and self.is_free(name) and thickness < known.period / known.grid:
                 layer, cell = formatting.length(thickness), formatting.length(known.period / known.grid, 3)
                 reason = f"contains the layer {label!r} of {layer}, thinner than a grid cell of {name!r} ({cell})"
                 yield ("materials",), study.materials, f"{reason}; expected a thicker layer or a finer grid"

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from demo_configuration import file_surface
+from demo_configuration import file_surface, measured_surface
 
 from icha.configuration.cases import surface_cases, surface_settings
 from icha.configuration.errors import ConfigurationError
@@ -70,6 +70,19 @@ def test_surfaces_with_a_tabulated_spectrum_have_seeds_and_the_slope_of_their_ta
     (tmp_path / "wrong.txt").write_text("1 2\nthree 4\n", encoding="utf-8")
     refused("", changes | {"surfaces.rough": section | {"path": "wrong.txt"}}, "surfaces.rough.path: '")
     refused("", changes | {"surfaces.rough": section | {"grid": 16}}, "cells per shortest wave; expected at least")
+
+
+def test_maps_of_adhesion_and_layers_are_compared_with_the_grid_of_a_scan(load, refused):
+    stripes = {"stripes": {"low": "10 mJ/m^2", "high": "50 mJ/m^2", "width": "8 um"}}
+    layer = {"materials.soft.thickness": "1 mm", "materials.soft.poisson_ratio": 0.5}
+    changes = {"surfaces.rough": measured_surface(boundary="free"), "studies.one.models": ["boundary_elements"]}
+    changes |= {"studies.one.rms_slopes": [0.2], "confirmed": ["surfaces.rough.grid"]}
+    for material in ({"materials.soft.surface_energy": stripes}, layer):
+        assert load(changes | material).campaign
+    refused("", changes | layer | {"materials.soft.thickness": "0.1 um"}, "thinner than a grid cell of 'rough'")
+    stripes["stripes"]["width"] = "7 um"
+    changes |= {"surfaces.rough": measured_surface(), "materials.soft.surface_energy": stripes}
+    refused("", changes, "does not fit the surface 'rough'")
 
 
 SECTION = {"kind": "measured", "path": "scan.npy", "boundary": "mirror", "height_unit": "nm", "size": "90 um"}
