@@ -12,16 +12,7 @@ import pytest
 import xarray as xr
 from digests import digest
 
-from icha import (
-    ConvergenceError,
-    IchaWarning,
-    Material,
-    Path,
-    SelfAffineSpectrum,
-    Sphere,
-    Surface,
-    simulate,
-)
+from icha import ConvergenceError, IchaWarning, Material, Path, SelfAffineSpectrum, Sphere, Surface, simulate
 from icha.asperity.stickiness import stickiness
 from icha.datasets.format import RUN, problems_with_file
 from icha.surfaces.moments import spectral_moments

@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 
 import icha
-from icha.configuration.cases import campaign_sha256, run_settings
-from icha.configuration.errors import ConfigurationError
-from icha.configuration.load import collect_inputs, load_configuration
+from icha.configuration.cases import run_settings
 
 ENERGY = "materials.soft.surface_energy"
 BY_CELLS = {"studies.one.models": ["boundary_elements"]}
@@ -39,28 +37,6 @@ def test_a_map_in_a_file_is_the_array_in_python(load, tmp_path, direction):
     found = material_of(load(BY_CELLS | {ENERGY: energy}).campaign)
     array = MAP * 1e-3
     assert found == icha.Material(25e6, (array, 0.09) if direction else array, 2.071e-9)
-
-
-def test_a_map_belongs_to_the_identity_and_to_the_inputs_of_a_campaign(load, tmp_path):
-    np.save(tmp_path / "map.npy", MAP)
-    asked = load(BY_CELLS | {"defaults": {"materials": {"surface_energy": FILE}}, ENERGY: None})
-    text, files = collect_inputs(asked)
-    place = "inputs/materials/soft/map.npy"
-    assert files == {place: str(tmp_path / "map.npy")} and "map.npy" in text and str(tmp_path) not in text
-    # The copy gives the same results at another place, and another map gives other ones.
-    copy = tmp_path / "copy"
-    (copy / place).parent.mkdir(parents=True)
-    (copy / "campaign.yaml").write_text(text)
-    np.save(copy / place, MAP)
-    again = load_configuration(copy / "campaign.yaml", within=copy)
-    assert campaign_sha256(again.campaign) == campaign_sha256(asked.campaign)
-    assert collect_inputs(again)[0] == text
-    np.save(copy / place, MAP + 1)
-    other = load_configuration(copy / "campaign.yaml", within=copy)
-    assert campaign_sha256(other.campaign) != campaign_sha256(asked.campaign)
-    (copy / "campaign.yaml").write_text(text.replace(place, "../map.npy"))
-    with pytest.raises(ConfigurationError, match=r"'\.\./map\.npy' is outside the folder of the configuration"):
-        load_configuration(copy / "campaign.yaml", within=copy)
 
 
 @pytest.mark.parametrize(

@@ -7,12 +7,7 @@ from scipy.stats import kstest, lognorm, norm, uniform
 
 import icha
 from icha.asperity.material import VAN_DER_WAALS_RANGE
-from icha.configuration.cases import (
-    campaign_sha256,
-    run_settings,
-    run_sha256,
-    surface_settings,
-)
+from icha.configuration.cases import campaign_sha256, run_settings, run_sha256, surface_settings
 from icha.configuration.design import sampled_parameters, varied_values
 from icha.configuration.errors import ConfigurationError
 from icha.datasets.labels import inputs_study

@@ -222,6 +222,9 @@ def test_files_are_stored_with_the_configuration(tmp_path):
     campaign["defaults"] = {"surfaces": {"path": "scan.txt", "kind": "measured"} | scans}
     campaign["surfaces"] = {"one": None, "other": {"path": "sub/scan.txt"}, "idle": {"path": "/nobody/knows/scan.txt"}}
     campaign["studies"]["load"] |= {"surfaces": ["one", "other"], "rms_slopes": [0.5]}
+    campaign["defaults"]["materials"] = {"surface_energy": {"file": "map.npy", "unit": "mJ/m^2"}}
+    campaign["materials"]["soft"].pop("surface_energy")
+    campaign["studies"]["load"]["models"] = ["boundary_elements"]
     campaign["figures"] = {"spots": {"study": "load", "script": "spots.py"}}
     columns = {"load": {"column": "p", "unit": "1"}, "area": {"column": "a", "unit": "percent"}}
     lab = {"path": str(tmp_path / "areas.csv"), "label": "laboratory", "citation": "Nobody, nowhere.", "study": "load"}
@@ -230,16 +233,17 @@ def test_files_are_stored_with_the_configuration(tmp_path):
     np.savetxt(tmp_path / "scan.txt", np.round(1e9 * small.surface().heights, 3))
     np.savetxt(tmp_path / "sub/scan.txt", np.round(2e9 * small.surface().heights.T, 3))
     (tmp_path / "areas.csv").write_text("p,a\n0.001,0.3\n")
+    works = np.random.default_rng(1).uniform(10, 50, (64, 64))
+    np.save(tmp_path / "map.npy", works)
     (tmp_path / "spots.py").write_text(f"import labels\n{SPOTS}")
     (tmp_path / "labels.py").write_text("SPOTS = 'spots'\n")
     (tmp_path / "asked.yaml").write_text(yaml.safe_dump(campaign))
     asked = load_configuration(tmp_path / "asked.yaml")
     text, files = collect_inputs(asked)
     assert str(tmp_path) not in text and "nobody" not in text
-    places = ("figures/spots/labels.py", "figures/spots/spots.py", "measurements/lab/areas.csv")
-    assert sorted(files) == [
-        f"inputs/{place}" for place in (*places, "surfaces/one/scan.txt", "surfaces/other/scan.txt")
-    ]
+    places = "figures/spots/labels.py", "figures/spots/spots.py", "materials/soft/map.npy", "measurements/lab/areas.csv"
+    places += "surfaces/one/scan.txt", "surfaces/other/scan.txt"
+    assert sorted(files) == [f"inputs/{place}" for place in places]
     kept = tmp_path / "kept"
     for place, file in files.items():
         (kept / place).parent.mkdir(parents=True, exist_ok=True)
@@ -248,3 +252,10 @@ def test_files_are_stored_with_the_configuration(tmp_path):
     again = load_configuration(kept / "config.used.yaml")
     assert campaign_sha256(again.campaign) == campaign_sha256(asked.campaign)
     assert collect_inputs(again) == (text, {place: str(kept / place) for place in files})
+    # Another map gives other results; no map outside of the folder is read.
+    np.save(kept / "inputs/materials/soft/map.npy", works + 1)
+    other = load_configuration(kept / "config.used.yaml", within=kept)
+    assert campaign_sha256(other.campaign) != campaign_sha256(asked.campaign)
+    (kept / "config.used.yaml").write_text(text.replace("inputs/materials/soft/map.npy", "../map.npy"))
+    with pytest.raises(ValueError, match=r"'\.\./map\.npy' is outside the folder of the configuration"):
+        load_configuration(kept / "config.used.yaml", within=kept)

@@ -2,16 +2,7 @@
 
 import numpy as np
 import pytest
-from half_space import (
-    CENTRES,
-    CURVATURE,
-    ENERGIES,
-    MODULUS,
-    RADIUS,
-    law,
-    periodic_displacement,
-    periodic_point_load,
-)
+from half_space import CENTRES, CURVATURE, ENERGIES, MODULUS, RADIUS, law, periodic_displacement, periodic_point_load
 
 from icha.half_space.ewald import PointHalfSpace
 from icha.half_space.interaction import Interaction, displacement_at

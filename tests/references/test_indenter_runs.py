@@ -11,12 +11,7 @@ from icha.boundary_elements.observables import hull_area
 from icha.equilibrium.distributions import edge_share
 from icha.figures.indenters import has_radius
 from icha.references import indentation as closed
-from icha.references.indenter_runs import (
-    apparent_work_of_adhesion,
-    first_approach,
-    loop_values,
-    reason_without_fit,
-)
+from icha.references.indenter_runs import apparent_work_of_adhesion, first_approach, loop_values, reason_without_fit
 from icha.surfaces.shapes import Cone, Sphere
 
 SIDE, MODULUS, RADIUS, ENERGY = 64e-6, 1e6, 1e-3, 0.05

@@ -78,7 +78,7 @@ def test_sticky_materials_are_named():
     assert good and "about 20 or more (soft on rough)" in text and "applicable" not in text
 
 
-def test_the_data_say_where_spots_lay_outside():
+def test_the_data_say_where_spots_lay_outside_and_which_runs_are_marked():
     found = {each.about: each for each in statements_on_dataset(small.tree())}
     assert found["models"].text == "asperities in slopes, single"
     assert "cells per shortest wave" in found["accuracy"].text and not found["accuracy"].good
@@ -88,27 +88,20 @@ def test_the_data_say_where_spots_lay_outside():
     sticky = [float(run["stickiness"]) for labels, run in small.runs() if labels.material == "soft"]
     said = f"soft on rough (stickiness {max(sticky):.2g})"
     assert (said in found["sticky"].text) if max(sticky) > 1 else "sticky" not in found
+    assert "applicability" not in found
     runs = [
         (labels, run.assign(outside_wu_fraction=0.4 + 0 * run["residual"]) if labels.material == "soft" else run)
         for labels, run in small.runs()
     ]
+    marked = [labels for labels, _ in runs if labels.seed == 1]
+    reasons = {labels: {"applicability": f"{labels.material} surface"} for labels in marked}
+    runs = [(labels, run.assign_attrs(reasons.get(labels, {}))) for labels, run in runs]
     found = {each.about: each for each in statements_on_dataset(campaign_tree(runs, attrs=small.tree().attrs))}
+    said = found["applicability"]
+    assert not said.good and said.text.startswith(f"a model is not applicable to {len(marked)} runs: ")
+    assert all(f"{labels.material} surface" in said.text for labels in marked)
     assert found["jump-in"].text.endswith("; outside this range: soft on rough (40 % of single spots)")
     assert not found["jump-in"].good
-
-
-def test_the_data_say_to_which_runs_their_model_is_not_applicable():
-    assert "applicability" not in {each.about for each in statements_on_dataset(small.tree())}
-    runs = [
-        (labels, run.assign_attrs(applicability=f"{labels.material} surface") if labels.seed == 1 else run)
-        for labels, run in small.runs()
-    ]
-    marked = [labels.material for labels, _ in runs if labels.seed == 1]
-    found = {each.about: each for each in statements_on_dataset(campaign_tree(runs, attrs=small.tree().attrs))}[
-        "applicability"
-    ]
-    assert not found.good and found.text.startswith(f"a model is not applicable to {len(marked)} runs: ")
-    assert all(f"{material} surface" in found.text for material in marked)
 
 
 def test_the_error_of_each_study_is_stated_with_its_range_and_its_size():

@@ -6,12 +6,7 @@ from scipy.integrate import quad
 
 import icha
 from icha.surfaces.moments import spectral_moments
-from icha.surfaces.tabulated_spectrum import (
-    CONVENTIONS,
-    SpectrumTable,
-    merge_spectra,
-    read_spectrum_table,
-)
+from icha.surfaces.tabulated_spectrum import CONVENTIONS, SpectrumTable, merge_spectra, read_spectrum_table
 
 SIDE = 100e-6
 TRUE = icha.SelfAffineSpectrum(SIDE, 25e-6, 5e-6, 0.8, rms_slope=0.1)

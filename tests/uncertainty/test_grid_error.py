@@ -16,12 +16,7 @@ from icha.figures.select import COARSE_GRID
 from icha.report.answers import answers_of, answers_table
 from icha.report.validity import statements_on_dataset
 from icha.uncertainty.estimates import estimate_campaign
-from icha.uncertainty.grid_error import (
-    AREA_ERROR,
-    LOOP_ERRORS,
-    cells_of_length,
-    error_beyond,
-)
+from icha.uncertainty.grid_error import AREA_ERROR, LOOP_ERRORS, cells_of_length, error_beyond
 from validation import loop_grid
 
 QUANTITIES = ("pull_off_pressure", "hysteresis_loss")
