@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ from scipy.spatial import KDTree
 from scipy.stats import t as student
 
 from icha.references.indentation import ContactState, sphere_contact, sphere_radius_at_force
+from icha.references.jkr_tables import far_from_the_rest
 
 # States of a branch, and the smallest contact radius among them, divided by that of the turning point.
 _STATES, _SMALLEST = 400, 1e-3
@@ -35,6 +37,10 @@ _STEP = 1e-3
 # Largest ratio of the ends of the interval of a modulus; wider ones are far beyond the linear approximation. Largest
 # leverage of a point in its interval: the residual of a point that alone determines a value shows no error.
 _WIDEST, _MOST_LEVERAGE = 10.0, 0.5
+# Points lie far from the others if their distance from a robust fit exceeds the first number of standard deviations,
+# which follow from the median of the distances, and the second number as a share of the range of a column. This fit is
+# needed if the distance from the first fit exceeds the last number of standard deviations.
+_OUTLYING, _OUTLYING_SHARE, _DOUBTFUL = 20.0, 0.1, 5.0
 
 
 class Loop(NamedTuple):
@@ -77,6 +83,7 @@ def fit_loop(
     radius: float,
     offset: float | None,
     probability: float,
+    places: Sequence[str],
 ) -> tuple[list[Loop], np.ndarray, np.ndarray]:
     """Fit a loop to measured points.
 
@@ -88,6 +95,7 @@ def fit_loop(
     radius : radius of the sphere, m.
     offset : offset of the indentation, m; None to fit it.
     probability : that an interval contains the true value.
+    places : name of each point for messages.
 
     Returns
     -------
@@ -97,7 +105,7 @@ def fit_loop(
     Raises
     ------
     ValueError
-        If the points do not determine the contact modulus.
+        If points lie far from the curves of all others, or if the points do not determine the contact modulus.
     """
     force, scales = points["force"], np.array([errors[name] for name in points])
     data, top, unloads = np.stack(list(points.values()), axis=-1) / scales, int(np.argmax(force)), bool(unloading.any())
@@ -135,6 +143,16 @@ def fit_loop(
     guesses.sort(key=lambda guess: np.sum(residuals(guess) ** 2))
     fits = [least_squares(residuals, guess, derivatives, **_CONVERGENCE) for guess in guesses[:_REFINED]]
     fit = min(fits, key=lambda each: each.cost)
+    usual = 1.5 * float(np.median(np.linalg.norm(fit.fun.reshape(data.shape), axis=1)))
+    if np.abs(fit.fun).max() > _DOUBTFUL * usual > 0:
+        # Points far from the others have little effect on this fit.
+        robust = {"loss": "cauchy", "f_scale": usual} | _CONVERGENCE
+        others = min((least_squares(residuals, each.x, derivatives, **robust) for each in fits), key=lambda e: e.cost)
+        distance = data - project(loop_of(others.x))[0]
+        size, share = np.linalg.norm(distance, axis=1), (np.abs(distance) / np.ptp(data, axis=0)).max(axis=1)
+        if (far := np.flatnonzero((size > _OUTLYING * 1.5 * np.median(size)) & (share > _OUTLYING_SHARE))).size:
+            texts = [", ".join(f"{name.replace('_', ' ')} {each[k]:.4g}" for name, each in points.items()) for k in far]
+            raise ValueError(far_from_the_rest([(places[k], text) for k, text in zip(far, texts, strict=True)]))
     freedom = data.size - len(data) - np.count_nonzero(fit.jac.any(axis=0))
     inverse = np.linalg.pinv(fit.jac)
     variance = 2 * fit.cost / freedom * (inverse**2).sum(axis=1)

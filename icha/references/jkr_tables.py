@@ -6,10 +6,11 @@ import math
 import os
 import re
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from icha.support.rules import FloatRange
 from icha.support.tables import numbers_of, read_table
@@ -30,6 +31,11 @@ _BRANCH = f"expected {_LOADING[0]} or {_UNLOADING[0]} (also {', '.join(_LOADING[
 
 # A number that exceeds every other one in its column by this factor is not a measured value.
 _FAR = 30
+# Nor is one whose distance from the median of five neighbours exceeds this share of the range of the medians, and this
+# multiple of the median distance. At jumps and at the turning point of a test, the distance is about one step.
+_SPIKE, _USUAL_SPIKES, _NEIGHBOURS = 0.5, 30, 5
+# Largest number of points that a message names.
+_NAMED = 5
 
 
 class Points(NamedTuple):
@@ -87,6 +93,8 @@ def read_points(table: Any, columns: Mapping[str, str], units: Mapping[str, str]
                 f"column {title!r}, {places[largest]}: {array[largest]:.6g} is more than {_FAR} times every other "
                 "number; expected measured values. Correct or remove the points that mark missing values by it"
             )
+        if (far := _spikes(array)).size:
+            raise ValueError(f"column {title!r}: {far_from_the_rest([(places[k], f'{array[k]:.6g}') for k in far])}")
     unloading = None
     if title := found.get("branch"):
         texts = [str(text).strip().lower() for text in by_title[title]]
@@ -96,6 +104,22 @@ def read_points(table: Any, columns: Mapping[str, str], units: Mapping[str, str]
         unloading = np.isin(texts, _UNLOADING)
     values = {name: array * factor for name, array, factor in zip(titles, numbers, factors, strict=True)}
     return Points(values, unloading, places)
+
+
+def _spikes(values):
+    """Return the indices of single points that lie far from the points before and after them."""
+    if len(values) < 4 * _NEIGHBOURS:
+        return np.array([], int)
+    middle, ends = median_filter(values, _NEIGHBOURS), _NEIGHBOURS // 2
+    distance = np.abs(values - middle)[ends:-ends]
+    return ends + np.flatnonzero(distance > max(_SPIKE * np.ptp(middle), _USUAL_SPIKES * np.median(distance)))
+
+
+def far_from_the_rest(points: Sequence[tuple[str, str]]) -> str:
+    """Return the message about points, each with its place and its values, that are far from all others."""
+    named = ", ".join(f"{place} ({value})" for place, value in points[:_NAMED]) + ", ..." * (len(points) > _NAMED)
+    count = "is one point that lies" if len(points) == 1 else f"are {len(points)} points that lie"
+    return f"there {count} far from the others: {named}; expected points of one curve. Correct or remove these points"
 
 
 def _find_columns(headings, columns):

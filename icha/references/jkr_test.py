@@ -175,7 +175,9 @@ def fit_jkr_test(
         elif missing := chosen.keys() - errors.keys():
             raise ValueError(f"errors: no value for {min(missing)}; expected one for {', '.join(chosen)}")
         errors = {name: POSITIVE.validate(f"errors, {name}", errors[name]) for name in chosen}
-        loops, near, used_for[used] = fit_loop(chosen, unloading[used], errors, radius, indentation_offset, PROBABILITY)
+        places = [points.places[k] for k in np.flatnonzero(used)]
+        options = radius, indentation_offset, PROBABILITY, places
+        loops, near, used_for[used] = fit_loop(chosen, unloading[used], errors, *options)
         if loops[0].contact_modulus > USUAL["contact_modulus"].most:
             raise ValueError(*unusual_arguments({"contact_modulus": loops[0].contact_modulus}))
     except ValueError as error:

@@ -189,6 +189,17 @@ def test_tables_that_are_no_jkr_test_are_refused(text, message, tmp_path):
     assert message in str(error.value)
 
 
+@pytest.mark.parametrize(
+    ("name", "point", "factor"), [("force", 15, 10), ("contact_radius", 5, 6), ("contact_radius", 30, 0.6)]
+)
+def test_points_far_from_all_others_are_refused_by_name(name, point, factor):
+    table = noisy_test(EXACT, np.random.default_rng(1), COLUMNS[:1])
+    table = {each: values / 10 + 0.9 * EXACT[each] for each, values in table.items()}
+    table[name][point] *= factor
+    with pytest.raises(ValueError, match=rf"one point that lies far from the others: point {point + 1} \(.*remove"):
+        icha.fit_jkr_test(table, RADIUS)
+
+
 def test_a_sorted_table_has_lost_the_order_of_the_test():
     """Sorting mixes loading and unloading, and a column of the branch separates them."""
     table = noisy_test(EXACT, np.random.default_rng(1), COLUMNS)
