@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from icha.asperity.full_contact import gaussian_complete_pressure
 from icha.support.formatting import format_quantity
-from icha.support.titles import contradicting_unit, problem_with_numbers
+from icha.support.titles import contradicting_unit, problem_with_numbers, problem_with_words
 from icha.support.units import conversion_factor
 from icha.support.values import NOTHING, File, Name, Positive, Problem, Section, Text, unknown
 
@@ -125,6 +125,8 @@ class Measurement(Section):
                     f"{key}: the heading {column.column!r} {problem}. Correct `unit` or the table, and if the numbers "
                     f"are in the unit {column.unit!r}, rename the heading in the table and in `column`"
                 )
+            if problem := problem_with_words(column.column, key):
+                raise ValueError(f"{key}: the heading {column.column!r} {problem} in the table and in `column`")
         groups = [group for group in _TOGETHER if self.si_units.keys() >= {*group}]
         if self.si_units.keys() != {name for group in groups for name in group} or not groups:
             raise ValueError(

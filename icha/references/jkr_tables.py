@@ -14,7 +14,13 @@ from scipy.ndimage import median_filter
 
 from icha.support.rules import FloatRange
 from icha.support.tables import numbers_of, read_table
-from icha.support.titles import contradicting_unit, problem_with_numbers, stated_unit
+from icha.support.titles import (
+    bracketed_texts,
+    contradicting_unit,
+    problem_with_numbers,
+    problem_with_words,
+    stated_unit,
+)
 from icha.support.units import PHYSICAL_NAMES, conversion_factor
 
 # SI unit and an example of a unit of the numbers; beginning of the headings.
@@ -149,9 +155,11 @@ def _factor(title, name, unit, from_file):
     stated = stated_unit(title)
     unit = unit or (stated.text if stated else "" if from_file else si_unit)
     if not unit:
+        others = bracketed_texts(title)
+        stated_text = f"{others[0]!r} is not a unit of {PHYSICAL_NAMES[si_unit]}" if others else "the unit is missing"
         raise ValueError(
-            f"column {title!r}: the unit is missing; expected a unit of {PHYSICAL_NAMES[si_unit]} in the heading, such "
-            f"as '{title} ({example})', or in `units`"
+            f"column {title!r}: {stated_text}; expected a unit of {PHYSICAL_NAMES[si_unit]} in the heading, such "
+            f"as '{name.replace('_', ' ')} ({example})', or in `units`"
         )
     try:
         factor = float(conversion_factor(unit, si_unit))
@@ -159,8 +167,6 @@ def _factor(title, name, unit, from_file):
         raise ValueError(f"column {title!r}: {error}; expected a unit such as {example}") from None
     if other := contradicting_unit(title, unit, si_unit):
         raise ValueError(f"column {title!r}: the unit is {unit!r}, but the heading states {other!r}; expected the same")
-    if problem := problem_with_numbers(title, unit, si_unit):
+    if problem := problem_with_numbers(title, unit, si_unit) or problem_with_words(title, name):
         raise ValueError(f"column {title!r} {problem}")
-    if name == "contact_radius" and re.search("diam|durchmesser|ø|⌀", title.lower()):
-        raise ValueError(f"column {title!r}: expected contact radii; divide the diameters by 2, and change the heading")
     return factor

@@ -35,6 +35,22 @@ _FACTOR = re.compile("|".join(_FACTORS))
 _FRACTION = re.compile(r"\b[Aa]\w*\s*/\s*[Aa]")
 # Loads divided by a modulus, such as F/(E* A0) and p/E*, and the slopes by which reduced pressures are also divided.
 _OVER_MODULUS = re.compile(r"/\s*\(?\s*(?:A\w*[\s*·]+)?E(?=[^A-Za-z]|$|A|r\b|eff\b|star\b)|(?i:relative[\s_]+load)")
+# Words in headings, by quantity. Other words, numbers and signs may mean another quantity, an error or a factor.
+_WORDS = {
+    "force": "force load f fn cell sensor",
+    "indentation": "indentation depth indent penetration displacement delta d h",
+    "contact_radius": "contact radius a r rc",
+    "load": "pressure load stress p f reduced relative nominal apparent squeezing",
+    "area": "area contact real true relative fraction fractional ratio a",
+    "rms_height": "rms height roughness hrms sq rq",
+    "advancing_work": "work of adhesion w gamma dgamma surface energy advancing apparent effective jkr fit",
+    "receding_work": "work of adhesion w gamma dgamma surface energy receding apparent effective jkr fit",
+}
+_HARMLESS = frozenset(
+    "in the normal applied measured experimental mean average loading unloading approach retraction".split()
+)
+# Formulas of ratios, such as A/A0 and p/(E* h'rms).
+_RATIOS = re.compile(r"\b[Aa]\w*\s*/\s*[Aa]\w*|\b[pFσ]\w*\s*/\s*\(?\s*(?:A\w*[\s*·]+)?E[^()]*\)?|\bp\*|^p′")
 _SLOPE = re.compile(r"h|slope|rms|grad|∇|\bg|m_?2", re.IGNORECASE)
 
 
@@ -48,6 +64,8 @@ def power_of_length(text: str) -> tuple[float, int] | None:
     plain = _ANGLE.sub("", unicodedata.normalize("NFKC", text)).translate({0x2212: "-", 0xB7: " ", 0x22C5: " "})
     factor, total = 1.0, 0
     for k, side in enumerate(plain.split("/")):
+        if k and re.match(r"\s*\d", side):  # a factor, as in um/10
+            return None
         for name, exponent in _LENGTH_POWER.findall(side):
             power = int(exponent or 1) * (-1 if k else 1)
             try:
@@ -64,15 +82,15 @@ class StatedUnit(NamedTuple):
     Attributes
     ----------
     text : unit as in the title.
-    si_unit : Pa, 1, N or m; m^2 and so on for other powers of length.
+    si_unit : Pa, 1, N, J/m^2 or m; m^2 and so on for other powers of length.
     factor : factor from the unit to `si_unit`.
-    multiple : True if a number stands in front of the unit, as in `10^3 Pa`.
+    multiple : number in front of the unit, as in `10^3 Pa`, or an empty text.
     """
 
     text: str
     si_unit: str
     factor: float
-    multiple: bool
+    multiple: str
 
 
 def stated_unit(title: str) -> StatedUnit | None:
@@ -81,16 +99,17 @@ def stated_unit(title: str) -> StatedUnit | None:
         # Outside brackets, words such as `count` are names, and `p_m` is not in metres; `radius um` is in micrometres.
         found = _meaning(text)
         if found and (certain or not (found == ("1", 1.0) or (found[0] == "m" and text not in _LENGTHS))):
-            return StatedUnit(text, *found, bool(_MULTIPLE.search(before)))
+            multiple = _MULTIPLE.search(before)
+            return StatedUnit(text, *found, multiple[0] if multiple else "")
     return None
 
 
 def contradicting_unit(title: str, unit: str, si_unit: str) -> str | None:
-    """Return the unit that a title states if it is not `unit`, whose SI unit is Pa, 1, N or m; else None."""
+    """Return unit and factor of a title if they are not `unit`, whose SI unit is Pa, 1, N or m; else None."""
     if (stated := stated_unit(title)) is None:
         return None
     agrees = stated.si_unit == si_unit and math.isclose(stated.factor, conversion_factor(unit, si_unit))
-    return None if agrees and not stated.multiple else stated.text
+    return None if agrees and not stated.multiple else f"{stated.multiple.strip()} {stated.text}".lstrip()
 
 
 def problem_with_numbers(title: str, unit: str, si_unit: str) -> str | None:
@@ -114,6 +133,28 @@ def problem_with_numbers(title: str, unit: str, si_unit: str) -> str | None:
     return None
 
 
+def problem_with_words(title: str, quantity: str) -> str | None:
+    """Return why a title may not be that of the plain values of a quantity, and what to do; None if it is.
+
+    Apart from the unit, such a title is one letter, or it has only words of the quantity (`_WORDS`).
+    """
+    name, rest = quantity.replace("_", " "), unicodedata.normalize("NFKC", title)
+    if stated := stated_unit(title):
+        rest = re.sub(rf"(?:[\[(/]\s*|(?<![^\W_])){re.escape(stated.text)}(?![^\W_])", " ", rest, count=1)
+    if quantity in ("load", "area"):
+        rest = _RATIOS.sub(" ", rest)
+    words = re.findall(r"[^\W_]+|(?<!\w)-|[^\w\s()\[\],:;.-]", rest)
+    if len(words) == 1 and len(words[0]) == 1 and words[0].isalpha():
+        words = ["diameter"] if quantity == "contact_radius" and words[0] in "dD" else []
+    known = _HARMLESS.union(_WORDS[quantity].split())
+    if not (other := [word for word in words if word.lower() not in known]):
+        return None
+    return (
+        f"contains {other[0]!r}, so the numbers may not be the {name}; expected words of the {name} and its unit. "
+        f"Convert the numbers if needed, and name the column {name!r}"
+    )
+
+
 def _possible_units(title):
     """Yield each text of a title that may be a unit, the text before it, and whether its place is that of a unit."""
     title = unicodedata.normalize("NFKC", title)
@@ -126,10 +167,10 @@ def _possible_units(title):
 
 
 def _meaning(text):
-    """Return the SI unit (Pa, 1, N, m or a power of m) and the factor of a unit; None for other texts."""
+    """Return the SI unit (Pa, 1, N, J/m^2, m or a power of m) and the factor of a unit; None for other texts."""
     plain = re.sub(r"(?<=[a-z])(?=\d)", "^", text)
     for name in (plain, _SPELLINGS.get(plain.lower())):
-        for si_unit in ("Pa", "1", "N") if name else ():
+        for si_unit in ("Pa", "1", "N", "J/m^2") if name else ():
             try:
                 return si_unit, float(conversion_factor(name, si_unit))
             except ValueError:

@@ -132,6 +132,24 @@ UNITS = [
     ("F/(E* A0)", "1", "area", "percent", "is a load over E* without the rms slope; expected reduced pressures p/"),
     ("p", "mPa", "area", "percent", "load: the unit 'mPa' is implausibly small; expected 'MPa', 'kPa' or 'Pa'"),
 ]
+# Headings of other quantities, of errors and of factors.
+OTHERS = [
+    (
+        {"contact_radius": "contact diameter (um)"},
+        "'contact diameter (um)' contains 'diameter', so the numbers may not be",
+    ),
+    ({"contact_radius": "2a (um)"}, "contains '2a'"),
+    ({"contact_radius": "a^2 (um)"}, "contains '^'"),
+    ({"contact_radius": "radius (px)"}, "contains 'px'"),
+    ({"indentation": "depth/2 (um)"}, "contains '/'"),
+    ({"force": "-force (mN)"}, "contains '-'"),
+    ({"force": "force error (mN)"}, "contains 'error'"),
+    ({"rms_height": "a", "advancing_work": "error of work (mJ/m^2)"}, "contains 'error'"),
+]
+UNITS += [
+    ("pressure (kPa)", "kPa", area, "percent", "so the numbers may not be the area")
+    for area in ("non-contact area (%)", "area (% of maximum)")
+]
 # Columns of measurements with an indenter, and other keys.
 LENS = [
     ({"force": "a"}, {}, "lab: has columns of force; expected load and area"),
@@ -157,6 +175,7 @@ SEVERAL = {"surfaces.other": OTHER, "studies.one.surfaces": ["rough", "other"]}
     [
         *((table, _measurement(**keys), {}, message) for table, keys, message in WRONG),
         *((f"{key[0]},{key[2]}\n0.1,0.2\n", _measurement(**_columns(*key)), {}, message) for *key, message in UNITS),
+        *(("a,b\n1,-2\n", _lens(**columns), SHAPE, message) for columns, message in OTHERS),
         *(("a,b\n1,-2\n", _lens(**columns) | keys, SHAPE, message) for columns, keys, message in LENS),
         ("F,a\n1,2\n", _lens(force="F", contact_radius="a"), SHAPE | SEVERAL, "whose surfaces have different radii"),
     ],
@@ -172,7 +191,7 @@ def test_measurements_that_cannot_be_drawn(table, entry, changes, message, refus
         ("pressure (N/mm²)", "MPa", "A/A0 [%]", "percent"),
         ("pressure", "kPa", "area fraction", "percent"),
         ("p/(E* h'rms)", "1", "area fraction", "1"),
-        ("pressure (N/mm**2)", "MPa", "area (%) 10x objective", "percent"),
+        ("nominal pressure (N/mm**2)", "MPa", "contact area (%)", "percent"),
     ],
 )
 def test_units_in_headings_may_be_written_in_other_ways(columns, load, tmp_path):
