@@ -106,28 +106,25 @@ def contact_map(
     heights = {"cmap": "cividis", "vmin": topography.lowest, "vmax": topography.highest}
     image = topography.draw(whole, **heights)
     record_spots(whole, circles, topography.side, Name("spots", labels))
-    nodes, borders = _window(topography.heights, topography.side, corner, width)
-    look = {"extent": borders, "origin": "lower", "interpolation": "nearest"}
-    enlarged.imshow(nodes * topography.scale, **look, **heights)
+    window = topography.side, corner, width
+    nodes, look = _window(topography.heights, *window)
+    enlarged.imshow(nodes * topography.scale, interpolation="nearest", **look, **heights)
     if alone:
         fraction = beside["contact_map"].transpose("row", "column").values.astype(float)
         draw_map(whole, fraction, topography.side, **_BLACK)
-        nodes, borders = _window(fraction, topography.side, corner, width)
-        enlarged.imshow(nodes, **look | {"extent": borders}, **_BLACK)
+        nodes, look = _window(fraction, *window)
+        enlarged.imshow(nodes, interpolation="nearest", **look, **_BLACK)
     else:
         draw_spots(whole, circles, facecolor=(*_RED, 0.85), lw=0, rasterized=len(circles) > _MANY_SPOTS)
         draw_spots(enlarged, circles, facecolor="none" if compared else (*_RED, 0.4), edgecolor=_RED, lw=1.0)
     area = rf"$A/A_0$ = {float(state['contact_area_fraction']):.3f}"
     whole.set_title(f"asperities, {area}" if compared else area, loc="right")
     enlarged.set_title(f"enlarged ×{topography.side / width:.2g}", loc="right")
-    if not compared:
-        say(fig, "Panel (b) enlarges the framed region around the largest spot.")
-    if alone:
-        say(fig, range_of_attraction(attractions_of([truth])))
+    say(fig, _COMPARED if compared else "Panel (b) enlarges the framed region around the largest spot.")
+    say(fig, "" if beside is None else range_of_attraction(attractions_of([truth])))
     if compared:
-        say(fig, _COMPARED, range_of_attraction(attractions_of([truth])))
         covered = contact_of_spots(data, at, len(beside["contact_map"]))
-        _draw_boundary_elements(panels, topography, (corner, width), heights, beside, covered)
+        _draw_boundary_elements(panels, topography, window, heights, beside, covered)
     if str(data["boundary"].values) == "periodic":
         say(fig, "The map is one period; spots continue across its borders. The mean height is zero.")
     elif select.has_shape(data):
@@ -141,7 +138,7 @@ def contact_map(
             frame = "white" if ax.get_images()[0].get_array().ndim == 2 else BLUE
             ax.add_patch(Rectangle(corner, width, width, fill=False, ec=frame, lw=1.2))
     enlarged.set(xlim=corner[0] + np.array([0, width]), ylim=corner[1] + np.array([0, width]))
-    bar = fig.colorbar(image, ax=panels, shrink=0.92 if beside is None else 0.46, pad=0.015, aspect=28)
+    bar = fig.colorbar(image, ax=panels, shrink=0.46 if compared else 0.92, pad=0.015, aspect=28)
     bar.set_label(f"height ({topography.height_unit})")
     return fig
 
@@ -167,33 +164,27 @@ def _draw_boundary_elements(panels, topography, window, heights, beside, covered
     contact = fraction >= 0.5
     topography.draw(solution, **heights)
     draw_map(solution, fraction, topography.side, **_BLACK)
-    nodes, borders = _window(fraction, topography.side, *window)
-    enlarged.contour(nodes, [0.5], extent=borders, origin="lower", colors="black", linewidths=0.9)
-    enlarged.legend(
-        handles=[
-            legend_handle(color=_RED, lw=1.0, label="asperities (edge)"),
-            legend_handle(color="black", lw=0.9, label="boundary elements (edge)"),
-        ],
-        loc="upper center",
-        bbox_to_anchor=(0.5, -0.17),
-        ncols=2,
-    )
+    nodes, look = _window(fraction, *window)
+    enlarged.contour(nodes, [0.5], **look, colors="black", linewidths=0.9)
+    below = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.17)}
+    edges = {"asperities (edge)": {"color": _RED, "lw": 1.0}, "boundary elements (edge)": {"color": "black", "lw": 0.9}}
+    enlarged.legend([legend_handle(**each) for each in edges.values()], edges, ncols=2, **below)
     palette = np.array([to_rgb(colour) for _, colour in _NODES])
     draw_map(compared, palette[1 * covered + 2 * contact], topography.side)
     keys = [Patch(fc=colour, label=name) for name, colour in _NODES if name]
-    compared.legend(handles=keys, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=3, columnspacing=1.0)
+    compared.legend(handles=keys, ncols=3, columnspacing=1.0, **below)
     solution.set_title(rf"{REFERENCE_NAME}, $A/A_0$ = {float(beside['contact_area_fraction']):.3f}", loc="right")
     compared.set_title(f"overlap (both / at least one) {jaccard(covered, contact):.2f}", loc="right")
 
 
 def _window(nodes, side, corner, width):
-    """Return the nodes of a periodic map that cover a window, and the coordinates of the four sides of this region."""
+    """Return the nodes of a periodic map that cover a window, and arguments of `Axes.imshow` for their place."""
     cell = side / len(nodes)
     columns, rows = (
         np.arange(start, start + int(np.ceil(width / cell)) + 2) for start in np.floor(corner / cell).astype(int)
     )
     borders = tuple(float(edge) * cell for at in (columns, rows) for edge in (at[0] - 0.5, at[-1] + 0.5))
-    return nodes[np.ix_(rows % len(nodes), columns % len(nodes))], borders
+    return nodes[np.ix_(rows % len(nodes), columns % len(nodes))], {"extent": borders, "origin": "lower"}
 
 
 # --- figure 6 ---
