@@ -268,7 +268,7 @@ def multi_slope(
                 if known["material"] in (None, *materials):
                     look = {"color": looks.material_colour(known["material"]), "ls": DASHES[k % len(DASHES)]}
                     values = np.append(values, _draw_measured(ax, panel, table, known, look))
-            ax.set_title(looks.material_name(materials[0]) if len(rows) > 1 else "", loc="right", fontsize=8)
+            ax.set_title(looks.label(materials[0]) if len(rows) > 1 else "", loc="right", fontsize=8)
             panel.label(ax, lowest=materials is rows[-1])
         curves.limit_ratios(row[1], values)
     legend_below(fig, shown.handles)

@@ -409,7 +409,7 @@ def _draw_parts(ax, lines, looks):
         ax.plot(position, -0.055, transform=ax.get_xaxis_transform(), clip_on=False, **look)
     ax.axhline(0, color="black", lw=0.6)
     ax.set(xlim=(-0.7, len(bars) - 0.3), ylabel="share of losses and gains (%)")
-    ax.set_xticks(range(len(bars)), [looks.place_name(line.place) for line in bars], rotation=90)
+    ax.set_xticks(range(len(bars)), [looks.label(line.place) for line in bars], rotation=90)
     ax.tick_params("x", length=0, pad=14, labelsize=7)
     ax.set_xlabel("series of (a), at their largest load", labelpad=2)
     return shown

@@ -250,13 +250,15 @@ def _draw_slopes(ax, runs, kind, colours, length):
 
 # --- figure 16 ---
 
-# Each kind of event has a name in the legend, a branch for which the map shows the events, and a look of the marks.
-# Marks are black if spots form or unite, and red if spots break or separate. Other colours stand for materials.
+# For each kind of event: its name in the legend, the branch for which the map shows the events, the relative size of
+# marks, the width of lines, and the look of marks. Marks are black if spots form or unite, and red if spots break or
+# separate. Other colours stand for materials. Rings are larger than dots, and squares larger than crosses, so that both
+# marks at one position are visible.
 _KINDS = {
-    "jump_in": ("spot formed", "loading", {"marker": "o", "mfc": BLACK, "mec": BLACK}),
-    "jump_off": ("spot broken", "unloading", {"marker": "o", "mfc": "none", "mec": _RED}),
-    "coalescence": ("union", "loading", {"marker": "D", "mfc": "none", "mec": BLACK}),
-    "split": ("union undone", "unloading", {"marker": "+", "mec": _RED}),
+    "jump_in": ("spot formed", "loading", 1.0, 1.3, {"marker": "o", "mfc": BLACK, "mec": BLACK}),
+    "jump_off": ("spot broken", "unloading", 1.6, 1.3, {"marker": "o", "mfc": "none", "mec": _RED}),
+    "coalescence": ("union", "loading", 1.6, 0.6, {"marker": "D", "mfc": "none", "mec": BLACK}),
+    "split": ("union undone", "unloading", 1.0, 0.6, {"marker": "+", "mec": _RED}),
 }
 # If every kind has at most _FEW events, marks have the size _SIZE, in points. Otherwise marks are smaller, so that the
 # total area of the marks remains about the same. No mark is smaller than _LEAST_SIZE.
@@ -294,18 +296,14 @@ def _draw_places(ax, topography, events):
     # The map is light, so that the marks are visible.
     image = topography.draw(ax, cmap="gray", vmin=2.2 * topography.lowest, vmax=topography.highest)
     topography.label(ax)
-    marks = {name: (events["kind"] == name) & (events["branch"] == branch) for name, (_, branch, _) in _KINDS.items()}
-    most = max(np.count_nonzero(shown) for shown in marks.values())
+    most = max(events[name, branch].sizes["event"] for name, (_, branch, *_) in _KINDS.items())
     size = max(_LEAST_SIZE, _SIZE * min(1.0, (_FEW / max(most, 1)) ** 0.5))
     handles = {}
-    for name, (words, _, look) in _KINDS.items():
-        shown = marks[name]
-        # Rings are larger than dots, and squares larger than crosses, so that both marks at one position are visible.
-        ring = 1.6 if name in ("jump_off", "coalescence") else 1.0
-        x, y = (events[axis][shown] * topography.length for axis in "xy")
-        points = plot(ax, x, y, words, **{"ls": "none", "ms": ring * size, "mew": 0.9} | look)
-        if shown.any():
-            handles[f"{words} ({np.count_nonzero(shown)})"] = points
+    for name, (words, branch, relative, _, look) in _KINDS.items():
+        x, y = (events[name, branch][f"event_{axis}"].values * topography.length for axis in "xy")
+        points = plot(ax, x, y, words, **{"ls": "none", "ms": relative * size, "mew": 0.9} | look)
+        if len(x):
+            handles[f"{words} ({len(x)})"] = points
     bar = ax.figure.colorbar(image, ax=ax, shrink=0.9, pad=0.02, aspect=28)
     bar.set_label(f"height ({topography.height_unit})")
     bar.ax.set_ylim(topography.lowest, topography.highest)
@@ -314,10 +312,9 @@ def _draw_places(ax, topography, events):
 
 def _draw_counts(ax, events):
     """Draw the cumulative number of events against the mean separation, by kind of event and branch."""
-    for name, (words, _, look) in _KINDS.items():
-        width = 0.6 if name in ("coalescence", "split") else 1.3
+    for name, (words, *_, width, look) in _KINDS.items():
         for branch, dashes in BRANCH_DASHES.items():
-            separation = events["separation"][(events["kind"] == name) & (events["branch"] == branch)]
+            separation = (events[name, branch]["event_separation"] / events[name, branch]["unit_height"]).values
             if len(separation):
                 steps, counts = np.append(separation[0], separation), np.arange(len(separation) + 1)
                 line = {"color": look["mec"], "ls": dashes, "lw": width, "drawstyle": "steps-post"}
@@ -328,16 +325,15 @@ def _draw_counts(ax, events):
 
 
 def _events(run):
-    """Return kind, branch, position (m) and separation u/h_rms of the events in first loading and last unloading."""
-    steps = run["event_step"].values.astype(int)
-    leg = run["leg"].sel(step=steps).values
-    shown = (leg == 0) | (leg == select.unloading_legs(run)[-1]["leg"].values[-1])
+    """Return the events in first loading and last unloading, by kind and branch."""
+    of_event = run[["leg", "branch"]].sel(step=run["event_step"].astype(int))
+    shown = of_event["leg"].isin([0, select.unloading_legs(run)[-1]["leg"].values[-1]]).values
+    kinds = np.array(EVENT_KINDS)[run["event_kind"].values.astype(int)]
+    events = run[["event_x", "event_y", "event_separation", "unit_height"]]
     return {
-        "kind": np.array(EVENT_KINDS)[run["event_kind"].values[shown].astype(int)],
-        "branch": run["branch"].sel(step=steps).values.astype(object)[shown],
-        "x": run["event_x"].values[shown],
-        "y": run["event_y"].values[shown],
-        "separation": run["event_separation"].values[shown] / float(run["unit_height"]),
+        (kind, branch): events.isel(event=shown & (kinds == kind) & (of_event["branch"].values == branch))
+        for kind in _KINDS
+        for branch in BRANCH_DASHES
     }
 
 

@@ -71,7 +71,7 @@ def _draw_errors(campaign, model_error, study, names, words):
                 handle = draw_points(ax, loads, members, look, positive=not unit, shift=shift, **of_curve)
             named.setdefault(looks.name(line), handle)
         for ax in row if own_rows else ():
-            ax.set_title(looks.material_name(shown[0]), loc="right", fontsize=8)
+            ax.set_title(looks.label(shown[0]), loc="right", fontsize=8)
     low, high = panels[0, 0].dataLim.intervalx
     middle, reach = np.sqrt(low * high), max(_MARGIN * np.sqrt(high / low), _LEAST_REACH)
     for ax, name in zip(panels.ravel(), itertools.cycle(names), strict=False):

@@ -126,7 +126,7 @@ class Looks:
 
     def colour(self, line: Line) -> str:
         """Return the colour of a line; grey if the figure has no line of this material or surface."""
-        return self._colours.get(line.place if self.by_place else line.material, GREY)
+        return self._colours.get(self._keys(line)[0], GREY)
 
     def material_colour(self, material: str | None) -> str:
         """Return the colour of a material; black if the colours do not show this material."""
@@ -143,7 +143,7 @@ class Looks:
             "ms": size,
             "lw": _LINE_WIDTH * size,
             "zorder": 3 + adhesive + 0.01 * self.materials.index(line.material),
-            "marker": self._markers[line.material if self.by_place else line.place],
+            "marker": self._markers[self._keys(line)[1]],
         }
         if not self._few:
             look |= {"lw": 0.6, "ms": (0.6 if self.many else 0.8) * size}
@@ -170,16 +170,16 @@ class Looks:
         """
         material, place = self.materials[0], self.places[0]
         if self.by_place:
-            found = {self.place_name(each): self.look(Line(material, *each)) | changed for each in some_of(self.places)}
+            found = {self.label(each): self.look(Line(material, *each)) | changed for each in some_of(self.places)}
             for each in [] if self.heading() else some_of(self.materials):
                 look = self.look(Line(each, *place)) | changed | {"color": GREY, "mec": GREY}
-                found[self.material_name(each)] = look | ({"mfc": GREY} if self.adhesive(each) else {})
+                found[self.label(each)] = look | ({"mfc": GREY} if self.adhesive(each) else {})
         else:
-            changed = ({"marker": MODEL_MARKERS[ASPERITIES_NAME]} if self.place_name(place) else {}) | changed
+            changed = ({"marker": MODEL_MARKERS[ASPERITIES_NAME]} if self.label(place) else {}) | changed
             looks = {each: self.look(Line(each, *place)) | changed for each in some_of(self.materials)}
-            found = {self.material_name(each): look for each, look in looks.items()}
+            found = {self.label(each): look for each, look in looks.items()}
             grey = {"ls": "none", "color": GREY, "mfc": "white", "mew": 0.9, "ms": 5}
-            found |= {self.place_name(each): grey | {"marker": marker} for each, marker in self._markers.items()}
+            found |= {self.label(each): grey | {"marker": marker} for each, marker in self._markers.items()}
             found.pop("", None)  # the name is empty if the figure has a single surface and slope
         return {name: legend_handle(**look) for name, look in found.items()}
 
@@ -191,40 +191,44 @@ class Looks:
 
     def heading(self) -> str | None:
         """Return the heading of a legend: the only material, if colours distinguish surfaces and slopes."""
-        return self.material_name(self.materials[0]) if self.by_place and len(self.materials) == 1 else None
+        return self.label(self.materials[0]) if self.by_place and len(self.materials) == 1 else None
 
     def colour_handles(self) -> dict[str, Line2D]:
         """Return legend entries that show only colours: bars of some materials, or of some surfaces and slopes."""
-        named, coloured = (self.place_name, self.places) if self.by_place else (self.material_name, self.materials)
-        return {named(each): legend_handle(color=self._colours[each], lw=4) for each in some_of(coloured)}
+        return {self.label(each): legend_handle(color=self._colours[each], lw=4) for each in some_of([*self._colours])}
 
     def shape_name(self, line: Line) -> str:
         """Return what the marker of a line shows, as text: surface and slope, or the material."""
-        return self.material_name(line.material) if self.by_place else self.place_name(line.place)
+        return self.label(self._keys(line)[1])
 
-    def material_name(self, material: str) -> str:
-        """Return a text with the modulus and the surface energy of a material."""
-        return material_label(self._interfaces, material)
+    def _keys(self, line):
+        """Return what the colour and what the marker of a line show: its material, or its place."""
+        return (line.place, line.material) if self.by_place else (line.material, line.place)
 
-    def place_name(self, place: tuple[str, float | None]) -> str:
-        """Return surface and rms slope as text; a surface or slope that all lines have in common is left out."""
-        surface, slope = place
+    def label(self, key: str | tuple[str, float | None]) -> str:
+        """Return modulus and surface energy of a material as text, or surface and rms slope of a place.
+
+        A surface or slope that all lines have in common is left out.
+        """
+        if isinstance(key, str):
+            return material_label(self._interfaces, key)
+        surface, slope = key
         surfaces, slopes = (set(each) for each in zip(*self.places, strict=True))
         words = [surface_label(self._campaign, surface)] if len(surfaces) > 1 else []
         return ", ".join([*words, slope_label(slope)] if slope is not None and len(slopes) > 1 else words)
 
     def rank(self, line: Line) -> int:
         """Return the number of a line in the order of the markers, from 0; 0 for unknown ones."""
-        shapes, shape = list(self._markers), line.material if self.by_place else line.place
+        shapes, (_, shape) = list(self._markers), self._keys(line)
         return shapes.index(shape) if shape in shapes else 0
 
     def name(self, line: Line) -> str:
         """Return a name that distinguishes a line from the other lines of the figure."""
-        place = self.place_name(line.place)
+        place = self.label(line.place)
         # If colours distinguish surfaces and slopes, the name of the only material is left out.
         if place and self.by_place and len(self.materials) == 1:
             return place
-        return ", ".join(filter(None, [self.material_name(line.material), place]))
+        return ", ".join(filter(None, [self.label(line.material), place]))
 
 
 def surface_label(campaign: xr.DataTree, surface: str) -> str:
