@@ -22,8 +22,6 @@ from icha.deposit.verify import COMPUTED
 from icha.planning.costs import Cost
 from icha.support import formatting
 
-# The page shows at most this number of entries of a list.
-_MOST_NAMES = 12
 # A web address in a text, without the punctuation that follows the address.
 _ADDRESS = re.compile(r"(https?://[^\s<>|`\\]*[^\s<>|`\\.,;:!?()\[\]*_~'\"])")
 # Characters with a meaning in Markdown: anywhere in a line, and at the beginning of a line.
@@ -59,7 +57,7 @@ def readme(
         "value": "{:z.2g}".format,
         "size": formatting.size,
         "duration": formatting.duration,
-        "few": _few,
+        "few": lambda values: formatting.list_first(map(markdown, values)),
     }
     text = environment.get_template("README.md.jinja").render(
         campaign=campaign,
@@ -111,12 +109,6 @@ def _outcome(publication: Publication, dataset: xr.DataTree, checks: Sequence[Ch
         "passed": sum(check.passed for check in checks),
         "total": len(checks),
     }
-
-
-def _few(values: Sequence) -> str:
-    """Return a list as text; a long list is shortened, and the number of its entries is added in brackets."""
-    shown = [markdown(value) for value in values]
-    return ", ".join(shown) if len(shown) <= _MOST_NAMES else f"{', '.join(shown[:_MOST_NAMES])}, … ({len(shown)})"
 
 
 def markdown(text) -> str:

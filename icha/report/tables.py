@@ -20,7 +20,7 @@ from icha.datasets.quantities import quantity
 from icha.datasets.surface_file import measured_scale
 from icha.datasets.variables.campaign import BEYOND_MODEL, COMPUTED_RUNS, FAILED_RUNS, LOADED_RUNS, MISSING
 from icha.report.template import format_symbols
-from icha.support.formatting import format_quantity, printable
+from icha.support.formatting import format_quantity, list_first, printable
 from icha.uncertainty.left_out import left_out_of_study
 
 _COUNTED = {
@@ -30,7 +30,6 @@ _COUNTED = {
     "failed": FAILED_RUNS,
     "missing": (MISSING,),
 }
-_MOST_VALUES = 12  # largest number of values in a cell
 
 
 class Table(NamedTuple):
@@ -120,18 +119,12 @@ def studies_table(studies: Mapping[str, xr.Dataset]) -> Table:
     for name, study in studies.items():
         runs, slopes = count_runs(study), [f"{slope:g}" for slope in slopes_of(study)]
         labels = (study[label].values.tolist() for label in ("surface", "seed", "material"))
-        surfaces, seeds, materials = map(_list, labels)
+        surfaces, seeds, materials = map(list_first, labels)
         models = ", ".join(MODELS[model].words for model in study["model"].values)
         rows.append(
-            (name, f"{runs['complete']} of {runs['requested']}", surfaces, seeds, _list(slopes), materials, models)
+            (name, f"{runs['complete']} of {runs['requested']}", surfaces, seeds, list_first(slopes), materials, models)
         )
     return Table("Studies", ("study", "complete runs", "surfaces", "seeds", "rms slopes", "materials", "models"), rows)
-
-
-def _list(values: list) -> str:
-    """List the first values, and the number of all values if there are more."""
-    more = f", … ({len(values)})" if len(values) > _MOST_VALUES else ""
-    return ", ".join(map(str, values[:_MOST_VALUES])) + more
 
 
 def materials_table(studies: Mapping[str, xr.Dataset]) -> Table:
@@ -178,7 +171,7 @@ def surfaces_table(surfaces: Iterable[xr.Dataset]) -> Table:
             cells.append(" to ".join(dict.fromkeys(ends)))
         first = members[0]
         grid, boundary = f"{int(first['grid'])}²", first.attrs.get("boundary", "periodic")
-        rows.append((name, _list(sorted(int(each["seed"]) for each in members)), boundary, grid, *cells))
+        rows.append((name, list_first(sorted(int(each["seed"]) for each in members)), boundary, grid, *cells))
     caption = (
         "Surfaces, after the preparation of a scan (filter, window). Studies scale the heights to their rms slopes"
     )

@@ -12,8 +12,8 @@ from html import escape
 
 from icha.support.units import PREFIXES
 
-# Largest number of texts that a list names.
-_MOST_NAMES = 4
+# Largest number of texts in a sentence, and of values in a cell of a table.
+_MOST_NAMES, _MOST_VALUES = 4, 12
 _CONTROLS = r"\x00-\x08\x0b-\x1f\x7f-\x9f"
 # Invisible marks, characters that change the writing direction, line separators, surrogates and tags. The joiners
 # U+200C and U+200D are allowed, because Persian, Indian languages and emoji need these characters.
@@ -34,6 +34,12 @@ def join_first(cases: Iterable[str], between: str = ", ") -> str:
     cases = list(cases)
     more = len(cases) - _MOST_NAMES
     return between.join(cases[:_MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
+
+
+def list_first(values: Iterable[object]) -> str:
+    """List the first values for a cell of a table, and append the number of all values if there are more."""
+    texts = list(map(str, values))
+    return ", ".join(texts[:_MOST_VALUES]) + (f", … ({len(texts)})" if len(texts) > _MOST_VALUES else "")
 
 
 def share(count: int, total: int) -> str:
