@@ -52,12 +52,16 @@ def own_patches(run, *, area=1.0, separation=1.0, attraction=SHORT_RANGE):
 
 
 def patches(keep=lambda labels: True, **factors):
-    """Return runs of boundary elements for those runs of asperities that `keep` selects."""
+    """Return runs of boundary elements for the runs of asperities that `keep` selects; factors may depend on seeds."""
     return [
-        (labels._replace(model="boundary_elements"), own_patches(run, **factors))
+        (labels._replace(model="boundary_elements"), own_patches(run, **_of_seed(factors, labels.seed)))
         for labels, run in runs().items()
         if keep(labels)
     ]
+
+
+def _of_seed(factors, seed):
+    return {name: factor[seed] if isinstance(factor, dict) else factor for name, factor in factors.items()}
 
 
 @cache
@@ -73,15 +77,7 @@ AREA_FACTORS = {1: 1.1, 2: 1.2, 3: 1.6}
 def patches_at_finite_range():
     """Boundary elements with more area, by a factor of the seed with adhesion and by a quarter without."""
     return [
-        *(
-            truth
-            for seed, area in AREA_FACTORS.items()
-            for truth in patches(
-                lambda labels, seed=seed: (labels.material, labels.seed) == ("soft", seed),
-                area=area,
-                attraction=FINITE_RANGE,
-            )
-        ),
+        *patches(lambda labels: labels.material == "soft", area=AREA_FACTORS, attraction=FINITE_RANGE),
         *patches(lambda labels: labels.material == "hertz", area=1.25, separation=0.8),
     ]
 

@@ -34,16 +34,12 @@ def unloaded(run, between=0):
     at = np.concatenate([stops, back])
     first = len(stops)
     leg = np.repeat([0, 1], [first, len(back)])
-    columns = {}
-    for name, variable in run.data_vars.items():
-        if variable.dims == ("step",):
-            floats = variable.dtype.kind == "f"
-            values = (
-                np.interp(at, np.arange(count), variable.values)
-                if floats
-                else variable.values[np.maximum(at, 0).astype(int)]
-            )
-            columns[name] = values
+    whole, ended = np.maximum(at, 0).astype(int), np.arange(len(at)) == len(at) - 1
+    of_steps = {name: variable.values for name, variable in run.data_vars.items() if variable.dims == ("step",)}
+    columns = {
+        name: np.interp(at, np.arange(count), values) if values.dtype.kind == "f" else values[whole]
+        for name, values in of_steps.items()
+    }
     between_stops = (at % 1 != 0) | (leg > 0)
     drop = TENSION * (1 + 0.1 * between) * columns["nominal_pressure"].max() if adhesive else 0.0
     unit = float(run["contact_modulus"] * run["rms_slope"])
@@ -53,26 +49,20 @@ def unloaded(run, between=0):
         columns[name][-1] = 0
     columns["reduced_pressure"] = columns["nominal_pressure"] / unit
     columns["reduced_separation"] = columns["mean_separation"] / float(run["rms_height"])
-    columns["branch"] = np.where(leg == 0, "loading", "unloading").astype(object)
-    columns["leg"] = leg
-    columns["split_count"] = np.zeros(len(at), int)
+    columns |= {"branch": np.where(leg == 0, "loading", "unloading").astype(object), "leg": leg}
+    columns |= dict.fromkeys(("split_count", "coalescence_count"), np.zeros(len(at), int))
     columns["step_kind"] = np.where(between_stops, "path", columns["step_kind"]).astype(object)
     columns["step_target"] = np.where(between_stops, columns["mean_separation"], columns["step_target"])
-    columns["coalescence_count"] = np.zeros(len(at), int)
     spots = run["spot_count"].values
-    columns["jump_in_count"] = np.where(leg == 0, spots[np.maximum(at, 0).astype(int)], spots[-1])
-    columns["jump_off_count"] = np.where(np.arange(len(at)) == len(at) - 1, spots[-1], 0)
+    columns["jump_in_count"] = np.where(leg == 0, spots[whole], spots[-1])
+    columns["jump_off_count"] = np.where(ended, spots[-1], 0)
 
     # First contact has no load. Before the last step, the jump-off, the work is the area between both curves; all other
     # work is stored.
     p, u = columns["nominal_pressure"], columns["mean_separation"]
     work = np.concatenate([[0.0], np.cumsum(-0.5 * (p[1:] + p[:-1]) * np.diff(u))])
-    if not adhesive:
-        work[-1] = 0.0
-    loss = work[-1]
-    ended = np.arange(len(at)) == len(at) - 1
-    columns["work"] = work
-    columns["dissipated_by_jump_off"] = np.where(ended, loss, 0.0)
+    work[-1] = work[-1] if adhesive else 0.0
+    columns |= {"work": work, "dissipated_by_jump_off": np.where(ended, work[-1], 0.0)}
     for name in ("jump_in", "coalescence", "load_jump", "front"):
         columns[f"dissipated_by_{name}"] = np.zeros(len(at))
     columns["stored_energy"] = work - columns["dissipated_by_jump_off"]
@@ -99,11 +89,7 @@ def unloaded(run, between=0):
     new |= {name: ("event", values, _UNKNOWN) for name, values in events.items()}
     new |= {name: ((), value, _UNKNOWN) for name, value in scalars.items()} | {"control": ((), "separation", _UNKNOWN)}
     # A stop keeps its snapshot, wherever it now stands.
-    new["snapshot_step"] = (
-        "snapshot",
-        np.searchsorted(at[:first], run["snapshot_step"].values),
-        run["snapshot_step"].attrs,
-    )
+    new["snapshot_step"] = run["snapshot_step"].copy(data=np.searchsorted(at[:first], run["snapshot_step"].values))
     step = ("step", np.arange(len(at)), run["step"].attrs)
     return kept.assign(new).assign_coords(step=step).set_coords(_COORDINATES)
 

@@ -36,7 +36,6 @@ DOCS = ROOT / "docs"
 TUTORIAL = DOCS / "tutorial.md"
 # Pages with instructions.
 GUIDES = [TUTORIAL, ROOT / "README.md", *sorted(DOCS.glob("howto/*.md"))]
-EVERY = pytest.mark.parametrize("page", GUIDES, ids=lambda page: page.stem)
 PAGES = [*sorted(DOCS.rglob("*.md")), ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
 
 
@@ -115,7 +114,7 @@ def loaded(folder, campaign):
     return load_configuration(path).campaign
 
 
-@EVERY
+@pytest.mark.parametrize("page", GUIDES, ids=lambda page: page.stem)
 def test_every_configuration_is_a_valid_one(page, folder):
     for line, campaign in campaigns(page):
         try:

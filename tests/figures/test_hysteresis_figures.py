@@ -20,7 +20,6 @@ from icha.figures.against_parameter import fit_line, shares
 from icha.figures.ensembles import Points
 from icha.figures.select import ContactRuns, select_unloaded_runs
 
-MODULES = (loops.loops, against_parameter.pull_off, against_parameter.loss)
 NAMES = (("reduced_separation", "reduced_pressure"), ("reduced_pressure", "contact_area_fraction"))
 # Numbers of steps of loading.
 DEPTHS = {"gentle": 4, "middle": 5, "hard": 6}
@@ -370,12 +369,6 @@ def test_boundary_elements_are_drawn_where_no_run_with_asperities_unloads():
 # --- all of them ------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("module", MODULES, ids=lambda module: module.__name__)
-def test_studies_that_do_not_unload_are_named(module):
-    with pytest.raises(ValueError, match=r"single: no run (reached its unloading|was unloaded)"):
-        draw(module, small.tree(), "single")
-
-
 @pytest.mark.parametrize("module", (against_parameter.pull_off, against_parameter.loss), ids=("fig14", "fig15"))
 def test_runs_in_contact_at_the_end_have_no_pull_off_and_no_loss(module):
     scalars = ["hysteresis_loss", "hysteresis_loss_over_surface_energy", "pull_off_pressure"]
@@ -384,6 +377,9 @@ def test_runs_in_contact_at_the_end_have_no_pull_off_and_no_loss(module):
     with pytest.raises(ValueError, match="one: no run was unloaded to complete separation"):
         draw(module, partial, "one")
     assert len(curves(loops.loops(partial, study="one").axes[0])[1]) == 1
+    for draws in (module, loops.loops):
+        with pytest.raises(ValueError, match=r"single: no run (reached its unloading|was unloaded)"):
+            draw(draws, small.tree(), "single")
 
 
 def test_legends_name_both_works_of_adhesion():

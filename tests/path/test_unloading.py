@@ -42,10 +42,6 @@ def test_one_asperity_is_on_its_stable_branch_from_jump_in_to_jump_off():
             assert d[-1] == pytest.approx(last, abs=1e-6)
             assert forces[-1] == pytest.approx(-5 / 6 * np.pi, rel=1e-4)
     assert few.counts(few.closed_again(waypoints)) == [1, 1, 0, 0]
-
-
-def test_the_largest_tension_of_one_asperity_is_found():
-    contact, waypoints = few.alone()
     weakest = min((w for w in waypoints if w.leg == 1), key=lambda w: few.load(contact, w))
     assert few.load(contact, weakest) == pytest.approx(-1.5 * np.pi, rel=1e-7)
     assert few.HEIGHT - weakest.state.separation == pytest.approx(few.PULL_OFF_APPROACH, abs=1e-3)
