@@ -19,7 +19,7 @@ from icha.datasets.labels import RunLabels
 from icha.path.snapshots import Snapshot
 from icha.path.targets import ESTIMATED_AT_TARGETS, ESTIMATED_OF_LOOPS
 from icha.support.scripts import caption_in, modules_of
-from icha.support.values import File, Label, Name, Positive, Problem, Section, Seed, list_names, list_of_names, unknown
+from icha.support.values import File, Label, Name, Names, Positive, Problem, Section, Seed, list_names, unknown
 
 if TYPE_CHECKING:
     from icha.configuration.campaign import Campaign
@@ -284,7 +284,7 @@ class LoopsFigure(UnitsFigure, TruthFigure, TopographyFigure, UnloadedFigure):
 class PullOffFigure(StudyFigure):
     """A figure of the pull-off pressure of all runs of some studies."""
 
-    load_studies: list_of_names() | None = Field(
+    load_studies: Names | None = Field(
         default=None, description="Names of studies that differ in their largest load, for a second panel."
     )
 
@@ -294,7 +294,7 @@ class PullOffFigure(StudyFigure):
 class LossFigure(FigureRequest):
     """A figure of the energy lost in a cycle of loading and unloading, for all runs of some studies."""
 
-    studies: list_of_names()
+    studies: Names
     """Names of the studies that are drawn. Lines are fitted to runs that differ only in their largest load."""
 
     needs = {"studies": ("unloads completely",)}

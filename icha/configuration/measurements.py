@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from icha.asperity.full_contact import gaussian_complete_pressure
 from icha.support.formatting import format_quantity
 from icha.support.titles import contradicting_unit, problem_with_numbers, problem_with_words
-from icha.support.units import conversion_factor
+from icha.support.units import find_factor
 from icha.support.values import NOTHING, File, Name, Positive, Problem, Section, Text, unknown
 
 # Reduced pressure at which contact without adhesion is complete, for a side of 10^6 shortest wavelengths. Surfaces with
@@ -24,14 +24,6 @@ _TOGETHER = (("load", "area"), ("force", "indentation"), ("force", "contact_radi
 _TOGETHER += (("rms_height", "advancing_work"), ("rms_height", "receding_work"))
 # Smallest plausible unit of nominal pressures, Pa. `mPa` is a thousandth of a pascal; most often, MPa is meant.
 _SMALLEST_UNIT = 0.01
-
-
-def _factor(unit: str, si_unit: str) -> float | None:
-    """Return the factor from a unit to an SI unit; None if the units belong to different quantities."""
-    try:
-        return float(conversion_factor(unit, si_unit))
-    except ValueError:
-        return None
 
 
 class Column(Section):
@@ -85,7 +77,7 @@ class Measurement(Section):
     @property
     def load_is_pressure(self) -> bool:
         """True if the column of the load contains nominal pressures."""
-        return self.load is not None and _factor(self.load.unit, "1") is None
+        return self.load is not None and find_factor(self.load.unit, "1") is None
 
     @property
     def si_units(self) -> dict[str, str]:
@@ -97,7 +89,7 @@ class Measurement(Section):
     def columns(self) -> dict[str, float]:
         """Headings of the columns, with the factors that convert the numbers to SI units."""
         found = [(getattr(self, name), unit) for name, unit in self.si_units.items()]
-        return {column.column: _factor(column.unit, unit) for column, unit in found}
+        return {column.column: find_factor(column.unit, unit) for column, unit in found}
 
     @property
     def signed(self) -> set[str]:
@@ -106,13 +98,13 @@ class Measurement(Section):
 
     @model_validator(mode="after")
     def _check_units(self):
-        if self.load_is_pressure and _factor(self.load.unit, "Pa") is None:
+        if self.load_is_pressure and find_factor(self.load.unit, "Pa") is None:
             raise ValueError(f"load: the unit is {self.load.unit!r}; expected '1' or a unit of pressure, such as 'kPa'")
-        if self.load_is_pressure and _factor(self.load.unit, "Pa") < _SMALLEST_UNIT:
+        if self.load_is_pressure and find_factor(self.load.unit, "Pa") < _SMALLEST_UNIT:
             raise ValueError(f"load: the unit {self.load.unit!r} is implausibly small; expected 'MPa', 'kPa' or 'Pa'")
         for key, si_unit in self.si_units.items():
             column = getattr(self, key)
-            if _factor(column.unit, si_unit) is None:
+            if find_factor(column.unit, si_unit) is None:
                 expected = "'1' or 'percent'" if si_unit == "1" else f"a unit such as {si_unit!r}"
                 raise ValueError(f"{key}: the unit is {column.unit!r}; expected {expected}")
             if stated := contradicting_unit(column.column, column.unit, si_unit):

@@ -78,7 +78,7 @@ def _number(value, unit):
 
 
 def unusual_topography(
-    location: tuple, section: Any, period: float, rms_slope: float | None, repeated: str = ""
+    location: tuple, section: Any, period: float, rms_slope: float | None, repeated: str
 ) -> Iterator[Unusual]:
     """For a topography from a file, yield the size, the rms slope and a repeated height if they are unusual.
 

@@ -45,6 +45,7 @@ from icha.support.values import (
     Force,
     Length,
     Name,
+    Names,
     OrSchema,
     Pressure,
     Problem,
@@ -55,9 +56,9 @@ from icha.support.values import (
     distinct,
     exactly_one,
     increasing,
-    list_of_names,
     number,
     quantity,
+    reader,
     stops,
     to_number,
 )
@@ -85,20 +86,13 @@ def slope_of_height(height: RmsHeight, unit: float) -> float:
     return float(f"{height.metres / unit:.6g}")
 
 
-def _slope(value: Any) -> float | str:
-    try:
-        slope = to_number(value)
-    except ValueError as error:
-        if value == MEASURED:
-            return value
-        raise ValueError(f"{error}; expected {SLOPE.expected}, or {MEASURED}") from None
-    if not SLOPE.contains(slope):
-        raise ValueError(f"is out of range; expected {SLOPE.expected}, or {MEASURED}")
-    return slope
-
-
+_read_slope = reader(to_number, SLOPE, f"{SLOPE.expected}, or {MEASURED}")
 _ONE_SLOPE = {"anyOf": [{"type": "number", "minimum": SLOPE.least, "maximum": SLOPE.most}, {"const": MEASURED}]}
-Slope = Annotated[Any, BeforeValidator(_slope), WithJsonSchema(_ONE_SLOPE)]
+Slope = Annotated[
+    Any,
+    BeforeValidator(lambda value: value if value == MEASURED else _read_slope(value)),
+    WithJsonSchema(_ONE_SLOPE),
+]
 Slopes = Annotated[
     list[Slope],
     BeforeValidator(lambda value: [value] if value == MEASURED else value),
@@ -265,7 +259,7 @@ _ShortForm = BeforeValidator(
 class Study(Section):
     """Runs for all combinations of surfaces, seeds, slopes and materials. All runs follow the same loading path."""
 
-    surfaces: list_of_names() = []
+    surfaces: Names = []
     """Names of surfaces."""
     seeds: Seeds = [1]
     """Seeds of the random phases: a list, or a range such as `1..50`. A surface from a file, or without
@@ -278,7 +272,7 @@ class Study(Section):
     """Rms heights with unit, such as `[100 nm]`, instead of `rms_slopes`. The heights of each topography are scaled to
     these values, also of each seed. The coordinate `rms_slope` of the results is then the slope of the spectrum at this
     height, with six digits. With `amplitudes: gaussian`, seeds have different slopes, √(2 `spectral_moment_2`)."""
-    materials: list_of_names() = []
+    materials: Names = []
     """Names of materials."""
     vary: Vary | None = None
     """Values of parameters of surfaces and materials. The study runs all combinations of these values."""
@@ -349,12 +343,7 @@ class Study(Section):
             settings["control"] = self.control
         return settings
 
-    def problems(
-        self,
-        pressure_unit: float = math.inf,
-        force_unit: float = math.inf,
-        side: float = math.inf,
-    ) -> Iterator[Problem]:
+    def problems(self, pressure_unit: float, force_unit: float, side: float) -> Iterator[Problem]:
         """Yield the problems that prevent the study from running.
 
         The arguments are those of `Campaign.units_of`; they are infinite if they are unknown.

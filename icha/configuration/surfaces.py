@@ -25,7 +25,7 @@ from icha.configuration.shapes import ShapeSection
 from icha.support import formatting
 from icha.support.checksums import sha256_of
 from icha.support.input_files import problem_with_path
-from icha.support.rules import GRID, HURST, LENGTH, POISSON_RATIO, FloatRange, IntegerRange
+from icha.support.rules import GRID, HURST, LENGTH, NUMBER, POISSON_RATIO, FloatRange, IntegerRange
 from icha.support.values import (
     PATTERN,
     ROUNDING,
@@ -40,6 +40,7 @@ from icha.support.values import (
     integer,
     number,
     quantity,
+    reader,
     to_si,
 )
 from icha.surfaces.resolution import NYQUIST_CELLS, Resolution
@@ -117,12 +118,9 @@ class PatchesSection(Section):
     """Seed of the field; all runs with the material have the same field."""
 
 
-def _unit_of_energy(value: Any) -> float:
-    """Convert a unit of a work of adhesion, such as `mJ/m^2`, to J/m^2."""
-    try:
-        return to_si(f"1 {value}", "J/m^2")
-    except ValueError as error:
-        raise ValueError(f"{error}; expected a unit of a work of adhesion, such as 'mJ/m^2'") from None
+_unit_of_energy = reader(
+    lambda value: to_si(f"1 {value}", "J/m^2"), NUMBER, "a unit of a work of adhesion, such as 'mJ/m^2'"
+)
 
 
 class AdhesionMapSection(Section):

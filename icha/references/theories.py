@@ -33,7 +33,6 @@ def reference_dataset(
     moments: SpectralMoments | None = None,
     adhesive: Mapping[tuple[float, str], Material] = {},
     *,
-    reduced_pressures=REDUCED_PRESSURES,
     attrs: Mapping[str, str] = {},
 ) -> xr.Dataset:
     """Return a dataset of theory curves for a surface, and of published points for surfaces with the same spectrum.
@@ -43,7 +42,6 @@ def reference_dataset(
     spectrum : spectrum of the surface, or None. Without a spectrum, Persson's theory gives only the area.
     moments : spectral moments of the surface at any rms slope; if None, theories of separate summits are left out.
     adhesive : materials with adhesion, by rms slope and name; each material has a curve of Fuller & Tabor.
-    reduced_pressures : values of p/(E* h'_rms), increasing and positive.
     attrs : additional global attributes.
 
     Returns
@@ -52,7 +50,7 @@ def reference_dataset(
     dimension `linear_point`. The theories of Greenwood & Williamson and of Fuller & Tabor have the dimension
     `summit_point`, at the areas `summit_area_fraction`. Published points have the dimension `gfmd_point`.
     """
-    values = _mean_field_theories(np.asarray(reduced_pressures, float), spectrum) | _published_points(spectrum)
+    values = _mean_field_theories(spectrum) | _published_points(spectrum)
     if moments is not None:
         values |= _summit_theories(moments, adhesive)
     variables = describe_variables(_TABLE, values)
@@ -87,8 +85,9 @@ _TABLE = THEORIES | {
 }
 
 
-def _mean_field_theories(pressure, spectrum):
-    """Return the theories of Persson and of Bush, Gibson & Thomas at reduced pressures, by variable name."""
+def _mean_field_theories(spectrum):
+    """Return the theories of Persson and of Bush, Gibson & Thomas, by variable name."""
+    pressure = REDUCED_PRESSURES
     area = summit_theories.bush_gibson_thomas_area(pressure)
     separate = area <= summit_theories.SEPARATE_SUMMITS_AREA_LIMIT
     values = {

@@ -5,7 +5,7 @@ import re
 import unicodedata
 from typing import NamedTuple
 
-from icha.support.units import conversion_factor
+from icha.support.units import conversion_factor, find_factor
 
 _BRACKETS = re.compile(r"\(((?:[^()]|\([^()]*\))*)\)|\[([^\[\]]*)\]")
 _ANGLE = re.compile(r"rad(?:ians?)?\b|(?:cycles?|lines?)\b")
@@ -68,10 +68,9 @@ def power_of_length(text: str) -> tuple[float, int] | None:
             return None
         for name, exponent in _LENGTH_POWER.findall(side):
             power = int(exponent or 1) * (-1 if k else 1)
-            try:
-                factor *= float(conversion_factor(name, "m")) ** power
-            except ValueError:
+            if (metres := find_factor(name, "m")) is None:
                 return None
+            factor *= metres**power
             total += power
     return (factor, total) if total else None
 
@@ -171,9 +170,7 @@ def _meaning(text):
     plain = re.sub(r"(?<=[a-z])(?=\d)", "^", text)
     for name in (plain, _SPELLINGS.get(plain.lower())):
         for si_unit in ("Pa", "1", "N", "J/m^2") if name else ():
-            try:
-                return si_unit, float(conversion_factor(name, si_unit))
-            except ValueError:
-                continue
+            if (factor := find_factor(name, si_unit)) is not None:
+                return si_unit, factor
     power = power_of_length(text)
     return power and ("m" if power[1] == 1 else f"m^{power[1]}", power[0])

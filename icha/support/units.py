@@ -88,6 +88,14 @@ def conversion_factor(unit: str, si_unit: str) -> Decimal:
     return found[0]
 
 
+def find_factor(unit: str, si_unit: str) -> float | None:
+    """Return the factor from `unit` to `si_unit`; None if the units are not convertible."""
+    try:
+        return float(conversion_factor(unit, si_unit))
+    except ValueError:
+        return None
+
+
 def _resolve(unit: str) -> tuple[Decimal, tuple[int, ...]] | None:
     """Return the factor of a product of units to m, kg and s, and the powers of m, kg and s; None for other texts."""
     plain = _SUPERSCRIPTS.sub(lambda match: "^" + unicodedata.normalize("NFKC", match[0]), unit.strip())

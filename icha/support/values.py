@@ -120,7 +120,12 @@ def number(rule: FloatRange):
 
 
 def _float(convert, rule, expected, schema, *metadata):
-    """Return the type of a float: `convert` reads the value, `rule` checks the bounds, messages contain `expected`."""
+    """Return the type of a float; the arguments are those of `reader`."""
+    return Annotated[float, BeforeValidator(reader(convert, rule, expected)), WithJsonSchema(schema), *metadata]
+
+
+def reader(convert: Callable[[Any], float], rule: FloatRange, expected: str) -> Callable[[Any], float]:
+    """Return a function that reads a value by `convert` and checks the bounds; its messages contain `expected`."""
 
     def read(value: Any) -> float:
         try:
@@ -131,7 +136,7 @@ def _float(convert, rule, expected, schema, *metadata):
             raise ValueError(f"is out of range; expected {expected}")
         return result
 
-    return Annotated[float, BeforeValidator(read), WithJsonSchema(schema), *metadata]
+    return read
 
 
 def rule_of(field: Any) -> FloatRange | None:
@@ -278,9 +283,8 @@ def stops(kind, in_order):
     return Annotated[list[kind], Field(min_length=1), AfterValidator(in_order)]
 
 
-def list_of_names(kind=Name):
-    """Return the type of a list of at least one name; each name may occur once."""
-    return Annotated[list[kind], Field(min_length=1), AfterValidator(distinct)]
+# List of at least one name; each name may occur once.
+Names = Annotated[list[Name], Field(min_length=1), AfterValidator(distinct)]
 
 
 class Section(BaseModel):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from icha.support.rules import GRID
-from icha.support.values import conversion_factor
+from icha.support.units import find_factor
 
 # Values of `boundary` that make a scan periodic; `periodic` and `free` are defined in `icha.surfaces.surface`.
 WINDOW, MIRROR = "window", "mirror"
@@ -132,7 +132,4 @@ def unused_factors(entries: Iterable[tuple[str, ...]], settings: Preparation) ->
 
 def metres_of(unit: str) -> float | None:
     """Convert the name of a unit of length to metres; None for any other text."""
-    try:
-        return float(conversion_factor(str(unit), "m"))
-    except ValueError:
-        return None
+    return find_factor(str(unit), "m")
