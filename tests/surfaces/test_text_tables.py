@@ -154,28 +154,37 @@ def test_factors_of_heights_in_headings_are_asked_about(tmp_path, entry):
     assert_heights(read(written(tmp_path, text(rows(), " ", ["Z scale: 1.0", "Z unit: nm"])), height_unit=None))
 
 
-@pytest.mark.parametrize(
-    "line",
-    [
-        "Line spacing: 1 um",
-        "Profile spacing: 1 um",
-        "Pixel aspect ratio: 2",
-        "Binning: 2",
-        "Binning: 2x2",
-        "Decimation: every 2nd point",
-        "Z increment: 0.1 nm",
-        "Conversion: 0.1",
-        "Values x 10",
-        "BAD = 0",
-    ],
+# Lines that may change the size, the heights, or both.
+OF_SIZE = (
+    "Line spacing: 1 um|Pixel aspect ratio: 2|Binning: 2x2|Decimation: every 2nd point|every second line is left out"
 )
+OF_SIZE += "|Downsampled|Stride: 2 pixels|Skip: one pixel"
+OF_HEIGHTS = "Z increment: 0.1 nm|Heights x10|Heights times ten|Z zoom: 10x|Überhöhung: 10-fach|log10 of heights"
+OF_BOTH = "Conversion: 0.1|Values x 10|BAD = 0|Zoom: 50%|half resolution|Multiplied by ten|Normalized to rms = 1"
+
+
+@pytest.mark.parametrize("line", f"{OF_SIZE}|{OF_HEIGHTS}|{OF_BOTH}".split("|"))
 def test_lines_that_may_change_size_and_heights_are_asked_about(tmp_path, line):
     path = written(tmp_path, text(rows(), " ", ["Pixel: 0.5 um", "Z unit: nm", line]), "scan.txt")
-    with refused("size", f"also {re.escape(repr(line))}, which may change it"):
-        read(path, size=None)
-    with refused("height_unit", f"also {re.escape(repr(line))}, which may change it|may be a factor"):
-        read(path, height_unit=None)
+    for key, others in (("size", OF_HEIGHTS), ("height_unit", OF_SIZE)):
+        if line in others.split("|"):
+            assert_heights(read(path, **{key: None}))
+        else:
+            with refused(key, f"also {re.escape(repr(line))}, which may change it|may be a factor"):
+                read(path, **{key: None})
     assert_heights(read(path))
+
+
+def test_lines_about_directions_and_factors_beside_points(tmp_path):
+    heading = ["Magnification: 2", "x [um],y [um],z [nm]"]
+    path = written(tmp_path, text(points(), ",", heading), "scan.txt")
+    with refused("lateral_unit", "also 'Magnification: 2', which may change it"):
+        read(path, size=None)
+    for line in ("Inverted: yes", "Z inverted", "Positive: down"):
+        path = written(tmp_path, text(rows(), " ", [line]))
+        with refused("touches_first", re.escape(line)):
+            read(path)
+    assert_heights(read(written(tmp_path, text(rows(), " ", ["Inverted: no"]))))
 
 
 @pytest.mark.parametrize("line", ["nrows 30", "ncols 12", "Lines: 30", "Columns: 25", '"Vertical",30'])

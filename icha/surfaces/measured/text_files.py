@@ -67,18 +67,34 @@ _NAMES = {
 # Names of lines about the measurement that contain numbers and change neither size nor heights.
 _REMARKS = re.compile(
     r"\b(?:date|time|datum|uhrzeit|heure|version|serial|operator|user|file|name|comment|title|id|no|nr|number"
-    r"|temperature|channel|[ip] gain|rate|speed|samples|average|zoom)\b"
+    r"|temperature|channel|[ip] gain|rate|speed|samples|average)\b"
 )
 # Meanings of lines with lengths along the surface, and the largest unit of heights, m.
 _LATERAL, _COARSEST = ("size", "pixel", "width", "height", "dx", "dy", "distance of points"), 1e-3
-# Words about points that were left out or united.
-_THINNED = re.compile(r"binning|decimat|every \S*\d|sub-?sampl", re.IGNORECASE)
+# Words about points that were left out or united, about magnified or converted numbers, and factors such as x10.
+_CHANGES = re.compile(
+    r"binning|decimat|thinn|skip|\bevery (?:other|second|third|\S*\d)|sampling|sub-?sampl|down-?sampl|reduc|stride"
+    r"|\bstep\s*[:=]|\bhal(?:f|ved)\b|doubl|zoom|scal(?:ed?|ing)\b|magnif|factor|multipl|\btimes\b|exag|überhöh"
+    r"|\d[ -]?(?:fold|fach)\b|^[^\d:=]*\s[x×*]\s*\d|normali[sz]|\blog\d*\b(?!\s*[:=])|\bln\b|logarithm",
+    re.IGNORECASE,
+)
+# Words of lines about the heights alone, and about the points alone.
+_ABOUT = {
+    "height_unit": re.compile(r"(?:^|[^\w])z\b|height|vertical|überhöh", re.IGNORECASE),
+    "size": re.compile(
+        r"lateral|\bxy?\b(?!\s*\d)|pixel|\bpx\b|\blines?\b|point|spacing|sampl|binning|decimat", re.IGNORECASE
+    ),
+}
 # A number alone, or a number and a unit of length.
 _VALUE = re.compile(rf"{_NUMBER}\s*(\S*)")
 _MEANINGS = {name: meaning for meaning, names in _NAMES.items() for name in names.split("|")}
 # An entry that states in which direction the numbers increase, and values that mean downwards.
-_DIRECTION = re.compile(r"\bz\b.*(axis|direction|achse)|polarity|height direction")
+_DIRECTION = re.compile(r"\bz\b.*(axis|direction|achse)|polarity|positive|height direction")
 _DOWNWARDS = re.compile(r"down|invert|depth|unten", re.IGNORECASE)
+# A line by which the numbers are inverted.
+_INVERTED = re.compile(
+    r"\binverted\b(?!\s*[:=]?\s*(?:no|0|off|false|none)\b)|\bdepth\s*[:=]?\s*positive", re.IGNORECASE
+)
 # Number for a missing height in grids by ESRI, if the heading does not define another number.
 _ESRI_MISSING = -9999.0
 
@@ -179,6 +195,10 @@ def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
     x_unit, y_unit = x_unit or lateral_unit, y_unit or lateral_unit
     named = "columns x {}, y {}, z {} by their names".format(*columns)
     remarks = named if titled and columns != sorted(columns) else "", heading.unused_factors(settings)
+    if x_unit and y_unit and settings.lateral_unit is None:
+        heading.ask_about_unread_line("lateral_unit", "the units of x and y")
+    if z_unit and settings.height_unit is None:
+        heading.ask_about_unread_line("height_unit", "the unit of z")
     size = (nx * dx * x_unit, ny * dy * y_unit) if x_unit and y_unit and settings.lateral_unit is None else None
     return FileContent(
         heights.reshape(ny, nx),
@@ -275,15 +295,20 @@ class _Heading:
         """Raise UnfitTopography if a heading of no known format has a line that may change what it states for a key.
 
         Such lines state a number alone or a length under a name that ICHA does not know, such as a line spacing,
-        binning or factor of the heights, or that points were left out.
+        binning or factor of the heights; or they have words such as in `_CHANGES`. Lines about the heights alone do not
+        change the size, and the reverse.
         """
-        for name, value, line in () if self.is_known else self.entries:
+        entries = {line: (name, value) for name, value, line in reversed(self.entries)}
+        for line in () if self.is_known else self.lines:
+            name, value = entries.get(line, ("", ""))
             found = _VALUE.match(value)
             known = name in (*_NAMES, "dx", "dy", "distance of points") or _REMARKS.search(name)
-            if known or re.fullmatch(r"1(?:[.,]0*)?(?:\s*[x×*]\s*1)?", value):
+            is_one = re.fullmatch(r"1(?:[.,]0*)?(?:\s*[x×*]\s*1)?", value)
+            if known or (is_one and "normali" not in name):
                 continue
+            about = [each for each, words in _ABOUT.items() if words.search(line)]
             number = found and (not found[2] or metres_of(found[2]) or found[2][0] in "xX×*")
-            if number or _THINNED.search(line):
+            if (number or _CHANGES.search(line)) and (len(about) != 1 or key.replace("lateral_unit", "size") in about):
                 self._ask(key, stated, line)
 
     def _ask(self, key, stated, line):
@@ -310,8 +335,10 @@ class _Heading:
 
     def unused_factors(self, settings: Preparation) -> str:
         """Return factors of the heights that are not applied; raise an error if the numbers increase downwards."""
-        for name, value, line in self.entries:
-            if settings.touches_first == "high" and _DIRECTION.search(name) and _DOWNWARDS.search(value):
+        inverted = [line for line in self.lines if _INVERTED.search(line)]
+        inverted += [line for name, each, line in self.entries if _DIRECTION.search(name) and _DOWNWARDS.search(each)]
+        for line in inverted:
+            if settings.touches_first == "high":
                 raise UnfitTopography(
                     f"is 'high', but the heading states {line.strip()[:60]!r}, so that points with high numbers are "
                     "valleys; expected 'low'. If the numbers increase upwards, remove this line from the file",
