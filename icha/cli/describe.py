@@ -184,7 +184,7 @@ def _print_sums(console, items) -> None:
         states = [item.state for item in items]
         counts = len(items), states.count(DONE), states.count(FAILED), len(left)
         each = formatting.duration(statistics.median(item.cost.seconds for item in items))
-        work = formatting.duration(sum(item.work for item in left)) if left else ""
+        work = formatting.duration(sum(item.cost.work for item in left)) if left else ""
         memory, disk = max(item.cost.memory for item in items), sum(item.cost.disk for item in items)
         return [*(str(count or "") for count in counts), each, work, formatting.size(memory), formatting.size(disk)]
 

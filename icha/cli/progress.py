@@ -44,7 +44,7 @@ class Progress:
     """
 
     def __init__(self, items: Iterable[Item], results: Path, cores: int):
-        self._work = {str(results / item.path): item.work for item in items if item.may_be_written}
+        self._work = {str(results / item.path): item.cost.work for item in items if item.may_be_written}
         self.expected = {str(results / item.path) for item in items if item.to_do}
         self._before = {path: _time_of(path) for path in self._work}
         self.finished: set[str] = set()

@@ -16,8 +16,8 @@ from icha.support.parallel import LARGE_GRID
 
 MiB = 2**20
 _DOUBLE = 8
-# Time in s before the first job, for starting and planning, and memory in bytes of `icha run` and Snakemake.
-START, WORKFLOW_MEMORY = 5.0, 310 * MiB
+# Time in s for planning, and for starting analysis and report; memory in bytes of `icha run` and Snakemake.
+START, WORKFLOW_MEMORY = 8.0, 310 * MiB
 # Time in s for starting a job, and memory in bytes of a job before its computation: Python and its libraries.
 JOB, JOB_MEMORY = 1.5, 130 * MiB
 # Time in s of the computation of another file, and of a figure.
@@ -84,6 +84,11 @@ class Cost:
     values: float = 0.0
     threads: int = 1
     minutes: int = 10
+
+    @property
+    def work(self) -> float:
+        """Expected work in core-seconds, with the share of the file in the start of the job of its batch."""
+        return (self.seconds + min(1.0, self.seconds / BATCH) * JOB) * self.threads
 
 
 @dataclass(frozen=True)

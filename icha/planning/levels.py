@@ -22,8 +22,8 @@ from icha.datasets.labels import coarse_study
 from icha.datasets.quantities import quantity
 from icha.datasets.results import CHOSEN_LEVELS
 from icha.path.targets import AREAS
-from icha.planning.plan import RUNS, plan
 from icha.planning.results import campaign_files
+from icha.planning.run_costs import corrected_costs
 from icha.support.atomic_files import whole_file
 from icha.support.formatting import format_count
 from icha.uncertainty.allocation import allocate, half_width_of_seeds, nest, variances_per_seed
@@ -79,14 +79,12 @@ def choose_levels(campaign: Campaign, results: Path, cores: int) -> dict[str, Ch
 
 def _costs(campaign, results) -> dict[str, dict[str, float]]:
     """Return the expected time of one seed of each level with all its contacts, s, for each study."""
-    seconds = {item.path: item.work for item in plan(campaign, results) if item.part == RUNS}
-    times: dict[tuple[str, str], list[float]] = {}
+    work: dict[tuple[str, str], list[float]] = {}
     seeds: dict[tuple[str, str], set[int]] = {}
-    for path, case in campaign_files(campaign).runs.items():
-        key = case.study, case.model
-        times.setdefault(key, []).append(seconds[path])
-        seeds.setdefault(key, set()).add(case.seed)
-    each = {key: sum(times[key]) / len(seeds[key]) for key in times}
+    for case, cost in corrected_costs(campaign, results).items():
+        work.setdefault((case.study, case.model), []).append(cost.work)
+        seeds.setdefault((case.study, case.model), set()).add(case.seed)
+    each = {key: sum(work[key]) / len(seeds[key]) for key in work}
     found: dict[str, dict[str, float]] = {}
     for name, study in campaign.studies.items():
         for model in study.models:

@@ -44,7 +44,6 @@ class Item:
     state : state of the file: DONE, TO_DO, OUTDATED or FAILED.
     reason : why the file is outdated, why the run failed, or why physics ended it; otherwise empty.
     cost : expected cost of the file.
-    start : share of the file in the start of its job; files that one job computes share the start.
     """
 
     part: str
@@ -53,7 +52,6 @@ class Item:
     state: str
     reason: str
     cost: costs.Cost
-    start: float = 1.0
 
     @property
     def to_do(self) -> bool:
@@ -64,11 +62,6 @@ class Item:
     def may_be_written(self) -> bool:
         """True if a call may write the file; a file with the expected stamp is kept."""
         return self.to_do or self.part not in (SURFACES, RUNS, THEORIES)
-
-    @property
-    def work(self) -> float:
-        """Expected work in core-seconds, with the share of the file in the start of its job."""
-        return (self.cost.seconds + self.start * costs.JOB) * self.cost.threads
 
 
 def needed_for(targets: Iterable[str], items: Iterable[Item]) -> list[Item]:
@@ -99,7 +92,7 @@ def plan(campaign: Campaign, results: Path | None) -> list[Item]:
         cost_of_run, state_of = run_costs(campaign), lambda path: (TO_DO, "")
 
     def item(part, group, path, cost):
-        return Item(part, group, path, *state_of(path), cost, min(1.0, cost.seconds / costs.BATCH))
+        return Item(part, group, path, *state_of(path), cost)
 
     for path, (name, _) in files.surfaces.items():
         items.append(item(SURFACES, "surfaces", path, costs.surface_cost(campaign.grid(name))))
@@ -135,21 +128,20 @@ def _analysis(campaign: Campaign, results: Path, computed: list[Item]) -> Iterat
     disk = sum(item.cost.disk for item in computed if item.part == RUNS)
     values = sum(item.cost.values for item in computed)
 
-    def item(part, path, cost, start=1.0):
+    def item(part, path, cost):
         state = DONE if not outdated and (results / path).is_file() else TO_DO
         group = "dataset and checks" if part == ANALYSIS else part
-        return Item(part, group, path, state, "", cost, start=start)
+        return Item(part, group, path, state, "", cost)
 
     sizes = {files.dataset: 0.5 * disk, files.table: 0.1 * disk, files.comparison: 0.03 * disk + 90e3}
     others = (*files.model_error, *files.answers, *files.sensitivity, files.checks)
     sizes |= dict.fromkeys(others, 100e3)
     for path, size in sizes.items():
-        yield item(ANALYSIS, path, costs.analysis_cost(size, values), 1 / len(sizes))
+        yield item(ANALYSIS, path, costs.analysis_cost(size, values))
     pictures = (path for path in files.figures if path.endswith("png"))
     for path, request in zip(pictures, campaign.figures.by_name().values(), strict=True):
         nodes = largest_grid(campaign) ** 2 if request.holds_topography else 0
-        cost = costs.figure_cost(values, nodes)
-        yield item(FIGURES, path, cost, cost.seconds / costs.BATCH)
+        yield item(FIGURES, path, costs.figure_cost(values, nodes))
     yield item(REPORT, files.report, costs.analysis_cost(700e3 + 80e3 * len(files.figures), values))
 
 
@@ -172,7 +164,7 @@ def time_on(items: Iterable[Item], cores: int) -> float:
     left = [item for item in items if item.to_do]
     if not left:
         return 0.0
-    return costs.START + max(sum(item.work for item in left) / cores, *(item.cost.seconds for item in left))
+    return costs.START + max(sum(item.cost.work for item in left) / cores, *(item.cost.seconds for item in left))
 
 
 def memory_on(items: Iterable[Item], cores: int) -> float:
