@@ -241,8 +241,13 @@ class MeasuredFigure(StudyFigure):
         return super().arguments(campaign) | ({"measurements": known} if known else {})
 
     def _known(self, campaign: Campaign, measurement: Measurement) -> dict[str, Any]:
-        """Return what the function that draws needs about a measurement."""
-        return {name: getattr(measurement, name) for name in ("label", "citation", "columns", "material")}
+        """Return the fields of `icha.figures.measured.Measured`, with columns and quantities instead of values."""
+        known = {name: getattr(measurement, name) for name in ("label", "citation", "columns", "material", "rms_slope")}
+        known["quantities"] = list(measurement.si_units)
+        if material := campaign.materials.get(measurement.material):
+            known["contact_modulus"] = material.contact_modulus if measurement.load_is_pressure else None
+            known["works"] = material.surface_energy, material.receding_energy or material.surface_energy
+        return known
 
     def measurements(self, campaign: Campaign) -> list[Measurement]:
         """Return the measurements that belong to the study and to the figure."""
@@ -252,12 +257,6 @@ class MeasuredFigure(StudyFigure):
 
 class SlopesAndMaterialsFigure(MeasuredFigure, TruthFigure):
     """A figure of all runs of a study, with boundary elements and measurements."""
-
-    def _known(self, campaign, measurement):
-        # Also the rms slope and, for loads in units of pressure, the contact modulus.
-        modulus = campaign.materials[measurement.material].contact_modulus if measurement.load_is_pressure else None
-        found = {"rms_slope": measurement.rms_slope, "contact_modulus": modulus}
-        return super()._known(campaign, measurement) | found
 
 
 class SlopesFigure(TopographyFigure):
@@ -308,15 +307,6 @@ class IndenterFigure(MeasuredFigure, UnloadedFigure):
     """A figure of the runs of a study with indenters, in loading and unloading, with measurements."""
 
     of_indenters = True
-
-    def _known(self, campaign, measurement):
-        # Also the names of the quantities, in the order of the columns, and the works of adhesion.
-        found = super()._known(campaign, measurement) | {"quantities": list(measurement.si_units)}
-        material = campaign.materials.get(measurement.material)
-        if material is None:
-            return found
-        works = material.surface_energy, material.receding_energy or material.surface_energy
-        return found | {"works": works}
 
     def _option_problems(self, campaign, study):
         yield from super()._option_problems(campaign, study)

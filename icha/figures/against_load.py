@@ -1,8 +1,6 @@
 """Figures of all runs of a study against load: area and separation (2), area and measurements (5), stiffness (7)."""
 
-import os
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
@@ -17,10 +15,10 @@ from icha.figures.curves import Panel, draw_theory, panel_in_units
 from icha.figures.drawn import Name, plot, record, say
 from icha.figures.ensembles import draw_members
 from icha.figures.looks import ASPERITIES_NAME, legend_below
+from icha.figures.measured import Measured, name_sources
 from icha.figures.select import NothingToDraw, has_shape
 from icha.figures.style import BLACK, DASHES, GREY, in_style, logarithmic_axes, new_panels
 from icha.references.bare_runs import ciavarella_states
-from icha.support.tables import read_columns
 
 _BLACK = {"color": BLACK, "lw": 1, "zorder": 2}
 
@@ -237,18 +235,16 @@ _RATIO, _RATIO_OF_SHAPE = Panel("reduced_pressure", "area_over_load"), Panel("re
 @in_style
 def multi_slope(
     campaign: xr.DataTree,
-    tables: Sequence[str | os.PathLike] = (),
     *,
     study: str,
     boundary_elements: str | None = None,
-    measurements: Sequence[Mapping[str, Any]] = (),
+    measurements: Sequence[Measured] = (),
 ) -> Figure:
     """Draw all runs of a study: area, and area over load.
 
     Area over load is drawn against the reduced pressure. If a surface has a shape, it is drawn against the relative
     load, because the unit of reduced pressures of a shape is not the rms slope, which a measurement has.
-    Axes of relative loads show only measurements whose relative loads are known. The `contact_modulus` of a measurement
-    is E*, Pa, if its loads are pressures in Pa, and None if they are reduced pressures p/(E* h'rms).
+    Axes of relative loads show only measurements whose relative loads are known.
     """
     shown = curves.study_curves(campaign, study, boundary_elements, open_markers=True)
     looks, shaped = shown.looks, has_shape(campaign[study].to_dataset())
@@ -264,25 +260,23 @@ def multi_slope(
         of_row, of_panels = shown._replace(lines=lines, crosses=crosses), dict(zip(row, columns, strict=True))
         drawn = curves.draw_curves(of_row, of_panels, unloading=True)
         for (ax, panel), (_, values) in zip(of_panels.items(), drawn, strict=True):
-            for k, (table, known) in enumerate(zip(tables, measurements, strict=True)):
-                if known["material"] in (None, *materials):
-                    look = {"color": looks.material_colour(known["material"]), "ls": DASHES[k % len(DASHES)]}
-                    values = np.append(values, _draw_measured(ax, panel, table, known, look))
+            for k, each in enumerate(measurements):
+                if each.material in (None, *materials):
+                    look = {"color": looks.material_colour(each.material), "ls": DASHES[k % len(DASHES)]}
+                    values = np.append(values, _draw_measured(ax, panel, each, look))
             ax.set_title(looks.label(materials[0]) if len(rows) > 1 else "", loc="right", fontsize=8)
             panel.label(ax, lowest=materials is rows[-1])
         curves.limit_ratios(row[1], values)
     legend_below(fig, shown.handles)
     if measurements:
-        named = "; ".join(f"{each['label']} ({each['citation']})" for each in measurements)
-        say(fig, f"Lines without markers are measurements: {named}.")
+        say(fig, f"Lines without markers are measurements: {name_sources(measurements)}.")
     return fig
 
 
-def _draw_measured(ax, panel, table, known, look):
+def _draw_measured(ax, panel, measured, look):
     """Draw a measured curve, if its loads are known in the unit of the axis, and return the values that are drawn."""
-    load, area = read_columns(table, known["columns"])
-    slope, modulus = known["rms_slope"], known["contact_modulus"]
-    states = {"contact_area_fraction": area}
+    load, slope, modulus = measured.values["load"], measured.rms_slope, measured.contact_modulus
+    states = {"contact_area_fraction": measured.values["area"]}
     if modulus:  # loads are pressures
         states |= {"relative_load": load / modulus} | ({"reduced_pressure": load / modulus / slope} if slope else {})
     else:
@@ -290,7 +284,7 @@ def _draw_measured(ax, panel, table, known, look):
     if panel.x not in states:
         return np.empty(0)
     x, y = panel.points(states)
-    plot(ax, x, y, **look | {"lw": 1.1, "zorder": 1, "label": known["label"]})
+    plot(ax, x, y, **look | {"lw": 1.1, "zorder": 1, "label": measured.label})
     return y
 
 

@@ -1,9 +1,8 @@
 """Figures of indenters: force against indentation (17), straight line of JKR (18), apparent work of adhesion (19)."""
 
 import itertools
-import os
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -15,6 +14,7 @@ from icha.figures import select
 from icha.figures.curves import panel_in_units
 from icha.figures.drawn import Name, plot, record, say
 from icha.figures.looks import BRANCH_DASHES, distinct_colours, graded_colours, legend_below
+from icha.figures.measured import Measured, name_sources
 from icha.figures.style import (
     BLACK,
     BLUE,
@@ -32,7 +32,6 @@ from icha.figures.style import (
 from icha.references.indentation import sphere_contact, sphere_jump_off
 from icha.references.indenter_runs import BRANCHES, reason_without_fit, spaced_states, steps_of
 from icha.support.formatting import choose_unit, format_quantity
-from icha.support.tables import read_columns
 
 # --- runs and measurements of all three figures ---
 
@@ -108,48 +107,12 @@ def has_radius(run: xr.Dataset) -> bool:
     return "shape_radius" in run and not select.has_layer(run)
 
 
-class Measured(NamedTuple):
-    """A measurement of an indenter.
-
-    Attributes
-    ----------
-    label : name in the legend.
-    material : material of the measurement; None if it is not given.
-    works : works of adhesion of the material, advancing and receding, J/m^2; None without a material.
-    values : measured values in SI units, arrays of the same length by quantity.
-    look : look of the points, with the marker.
-    """
-
-    label: str
-    material: str | None
-    works: tuple[float, float] | None
-    values: dict[str, np.ndarray]
-    look: dict[str, object]
-
-
-def read_measured(
-    figure: Figure,
-    tables: Sequence[str | os.PathLike],
-    measurements: Sequence[Mapping],
-    *needed: str,
-    any_of: Iterable[str] = (),
-) -> list[Measured]:
-    """Return the measurements that a figure shows, and name them in its caption.
-
-    A measurement has a `label`, a `citation`, `columns` (headings and factors), `quantities` (names by column), a
-    `material`, and `works` if the material is known. A shown measurement has all quantities `needed`, and one of
-    `any_of`.
-    """
-    found, sources = [], []
-    for k, (table, known) in enumerate(zip(tables, measurements, strict=True)):
-        names = known["quantities"]
-        if {*needed} <= {*names} and (not any_of or {*any_of} & {*names}):
-            columns = read_columns(table, known["columns"], signed=known["columns"])
-            look = _MEASURED | {"marker": _CROSSES[k % len(_CROSSES)]}
-            values = dict(zip(names, columns, strict=True))
-            found.append(Measured(known["label"], known["material"], known.get("works"), values, look))
-            sources.append(f"{known['label']} ({known['citation']})")
-    say(figure, f"Crosses are measurements: {'; '.join(sources)}." if sources else "")
+def _select_measured(figure, measurements, *needed):
+    """Return the measurements with all quantities `needed` and their looks, and name them in the caption."""
+    looks = [_MEASURED | {"marker": _CROSSES[k % len(_CROSSES)]} for k in range(len(measurements))]
+    found = [each for each in zip(measurements, looks, strict=True) if {*needed} <= each[0].values.keys()]
+    sources = name_sources(each for each, _ in found)
+    say(figure, f"Crosses are measurements: {sources}." if found else "")
     return found
 
 
@@ -175,17 +138,11 @@ without a radius and layers have no line."""
 
 
 @in_style
-def force_indentation(
-    campaign: xr.DataTree,
-    tables: Sequence[str | os.PathLike] = (),
-    *,
-    study: str,
-    measurements: Sequence[Mapping[str, Any]] = (),
-) -> Figure:
+def force_indentation(campaign: xr.DataTree, *, study: str, measurements: Sequence[Measured] = ()) -> Figure:
     """Draw force against indentation for all runs of a study, with the theories for each radius and material.
 
-    Series have a panel each if they are many, or if they differ in more than the rms height. Tables and measurements
-    (`read_measured`) with forces and indentations are shown too.
+    Series have a panel each if they are many, or if they differ in more than the rms height. Measurements with forces
+    and indentations are shown too.
     """
     series = select_series(campaign, study)
     runs = [run for each in series for run in each.runs.by_seed.values()]
@@ -196,8 +153,8 @@ def force_indentation(
     labels = {f"{axis}label": label_of(name, unit) for axis, name, unit in zip("xy", names, panel.units, strict=True)}
     fig, panels = new_grid(len(shown), 2, 2.7, 3.55, least=1.3, **labels, sharex=True, sharey=True)
     say(fig, _INDENTATION)
-    measured = read_measured(fig, tables, measurements, *names)
-    points = map(panel.points, [*runs, *(each.values for each in measured)])
+    measured = _select_measured(fig, measurements, *names)
+    points = map(panel.points, [*runs, *(each.values for each, _ in measured)])
     limits = [limits_around(np.concatenate(values)) for values in zip(*points, strict=True)]
     largest = max(float(run["contact_radius"].max()) for run in runs)
     theories = {}
@@ -211,9 +168,9 @@ def force_indentation(
                 for branch, leg in select.branches(run):
                     look = {"color": each.colour, "ls": BRANCH_DASHES[branch], **_LOOP}
                     plot(ax, *panel.points(leg), Name(branch, of_seed), **look)
-        for each in measured:
+        for each, look in measured:
             if each.material in (None, *(one.runs.labels.material for one in of_panel)):
-                plot(ax, *panel.points(each.values), each.label, **each.look)
+                plot(ax, *panel.points(each.values), each.label, **look)
         ax.axhline(0, color=GREY, lw=0.5, zorder=0)
         if len(shown) > 1:
             ax.set_title(of_panel[0].name, loc="right")
@@ -223,7 +180,7 @@ def force_indentation(
     handles = {each.name: legend_handle(color=each.colour, **_LOOP) for each in named}
     handles |= {name: legend_handle(color=BLACK, ls=dashes, **_LOOP) for name, dashes in BRANCH_DASHES.items()}
     handles |= {f"{name}, smooth sphere": legend_handle(**_THEORIES[name]) for name in theories}
-    handles |= {each.label: legend_handle(**each.look) for each in measured}
+    handles |= {each.label: legend_handle(**look) for each, look in measured}
     legend_below(fig, handles)
     return fig
 
@@ -262,19 +219,13 @@ E* and R, so states with a large radius have most weight. The legend gives means
 
 
 @in_style
-def jkr_plot(
-    campaign: xr.DataTree,
-    tables: Sequence[str | os.PathLike] = (),
-    *,
-    study: str,
-    measurements: Sequence[Mapping[str, Any]] = (),
-) -> Figure:
+def jkr_plot(campaign: xr.DataTree, *, study: str, measurements: Sequence[Measured] = ()) -> Figure:
     """Draw a^(3/2)/R against F/a^(3/2) for loading and unloading, with the fitted JKR lines.
 
     The equation of JKR, F = 4 E* a^3/(3 R) - sqrt(8 pi E* w a^3), is the straight line y = 3 (x + sqrt(8 pi E* w))/(4
     E*) with x = F/a^(3/2) and y = a^(3/2)/R. Runs without adhesion, without a radius R, and on a layer are left out.
-    Tables and measurements (`read_measured`) with forces and contact radii are shown too. The largest force is the end
-    of loading, and R is that of the runs.
+    Measurements with forces and contact radii are shown too. The largest force is the end of loading, and R is that of
+    the runs.
     """
     series = select_series(campaign, study, only_jkr=True)
     drawn = []
@@ -298,20 +249,20 @@ def jkr_plot(
             modulus = float(run["contact_modulus"])
             line = 0.75 / modulus * (x + np.sqrt(8 * np.pi * modulus * float(run[name])))
             plot(ax, x * scale, line * 1e3, Name("fit of JKR", labels), color=each.colour, **_FIT)
-    measured = read_measured(fig, tables, measurements, "force", "contact_radius")
-    for each in measured:
+    measured = _select_measured(fig, measurements, "force", "contact_radius")
+    for each, look in measured:
         force = each.values["force"]
         x, y = _straight(force, each.values["contact_radius"], series[0].runs.first)
         top = int(np.argmax(force))
         for ax, part in zip(panels, (slice(top + 1), slice(top, None)), strict=True):
-            plot(ax, x[part] * scale, y[part] * 1e3, each.label, **each.look)
+            plot(ax, x[part] * scale, y[part] * 1e3, each.label, **look)
     for ax, (name, _) in zip(panels, _TITLES.values(), strict=True):
         ax.set_title(name, loc="right")
         ax.set(xlabel=rf"$F/a^{{3/2}}$  ({unit} m$^{{-3/2}}$)", ylabel=r"$a^{3/2}/R$  ($10^{-3}$ m$^{1/2}$)")
         ax.label_outer()
     handles = {f"{each.name}: {_works(each)}": legend_handle(color=each.colour, **_FIT) for each in series}
     states = {"states": legend_handle(marker="o", mec=GREY, **_STATES), "fit of JKR": legend_handle(color=GREY, **_FIT)}
-    legend_below(fig, handles | states | {each.label: legend_handle(**each.look) for each in measured})
+    legend_below(fig, handles | states | {each.label: legend_handle(**look) for each, look in measured})
     return fig
 
 
@@ -357,17 +308,11 @@ pull-off that of receding edges; fits to unloading then leave out states whose e
 
 
 @in_style
-def work_of_adhesion(
-    campaign: xr.DataTree,
-    tables: Sequence[str | os.PathLike] = (),
-    *,
-    study: str,
-    measurements: Sequence[Mapping[str, Any]] = (),
-) -> Figure:
+def work_of_adhesion(campaign: xr.DataTree, *, study: str, measurements: Sequence[Measured] = ()) -> Figure:
     """Draw works of adhesion of fits and of pull-off, divided by the surface energy.
 
-    Lines join means over seeds of series that differ only in their rms height. Tables and measurements
-    (`read_measured`) with rms heights and works of adhesion are shown too.
+    Lines join means over seeds of series that differ only in their rms height. Measurements with rms heights are shown
+    too.
     """
     series = select_series(campaign, study, only_jkr=True)
     runs = [run for each in series for run in each.runs.by_seed.values()]
@@ -402,10 +347,10 @@ def work_of_adhesion(
             ax.plot(*np.transpose(means), marker=marker, color=colour, **_MEAN)
             handles[name] = legend_handle(color=GREY if contact else colour, marker=marker, **_MEAN)
     markers = itertools.cycle(_CROSSES)
-    for each in read_measured(fig, tables, measurements, "rms_height", any_of=_MEASURED_WORKS):
+    for each, look in _select_measured(fig, measurements, "rms_height"):
         for (name, branch), work in zip(_MEASURED_WORKS.items(), each.works, strict=True):
             if name in each.values:
-                label, look = f"{each.label}, {branch}", each.look | {"marker": next(markers)}
+                label, look = f"{each.label}, {branch}", look | {"marker": next(markers)}
                 plot(ax, each.values["rms_height"] * scale, each.values[name] / work, label, **look)
                 handles[label] = legend_handle(**look)
     ax.axhline(1, color=GREY, lw=0.6, zorder=0)

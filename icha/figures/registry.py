@@ -63,12 +63,15 @@ def draw_figure(
     from icha.datasets.table import as_csv
     from icha.figures.captions import count_runs, units_of_shapes
     from icha.figures.drawn import caption_of, models_of, say, table_of
+    from icha.figures.measured import read_measurements
     from icha.figures.select import NothingToDraw
     from icha.figures.style import empty_page, save
     from icha.support.atomic_files import whole_file
     from icha.support.scripts import caption_in
 
     data = {argument: _read(files) for argument, files in inputs.items()}
+    if "tables" in data:
+        arguments = {**arguments, "measurements": read_measurements(data.pop("tables"), arguments["measurements"])}
     try:
         figure = drawing_function(name)(**data, **arguments)
         groups = getattr(data.get("campaign"), "children", {})

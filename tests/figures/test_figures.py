@@ -19,6 +19,7 @@ from icha.figures import against_load, against_parameter, at_one_load, contact_m
 from icha.figures.drawn import caption_of
 from icha.figures.looks import material_colours
 from icha.figures.maps import average_blocks, wrap_circles
+from icha.figures.measured import read_measurements
 from icha.figures.select import NothingToDraw, branches, path_steps, select_runs
 from icha.figures.style import save
 from icha.references.persson import persson_pressure_density
@@ -132,17 +133,12 @@ def test_circles_continue_across_borders():
 def test_fig5_draws_measurements_over_the_curves(tmp_path):
     (tmp_path / "one.csv").write_text("p, a\n1, 0.2\n10, 2\n20, 4\n")
     (tmp_path / "other.csv").write_text("p, a\n1e-3, 3e-3\n1e-2, 3e-2\n2e-2, 5e-2\n")
+    known = {"label": "Someone, 2020", "citation": "Someone", "quantities": ["load", "area"]}
     measured = {"columns": {"p": 1e3, "a": 0.01}, "contact_modulus": 5e6, "material": "soft", "rms_slope": 0.2}
-    without_slope = {"columns": {"p": 1.0, "a": 1.0}, "contact_modulus": None, "material": None, "rms_slope": None}
-    figure = against_load.multi_slope(
-        small.tree(),
-        [tmp_path / "one.csv", tmp_path / "other.csv"],
-        study="slopes",
-        measurements=[
-            measured | {"label": "Someone, 2020", "citation": "Someone"},
-            without_slope | {"label": "Another", "citation": "Another"},
-        ],
-    )
+    without_slope = {"columns": {"p": 1.0, "a": 1.0}, "material": None, "label": "Another", "citation": "Another"}
+    tables = [tmp_path / "one.csv", tmp_path / "other.csv"]
+    measurements = read_measurements(tables, [known | measured, known | without_slope])
+    figure = against_load.multi_slope(small.tree(), study="slopes", measurements=measurements)
     assert "measurements: Someone, 2020 (Someone); Another (Another)." in caption_of(figure)
     left, right = figure.axes
     found = {line.get_label(): line for line in right.get_lines() if not line.get_label().startswith("_")}

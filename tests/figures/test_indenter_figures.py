@@ -18,6 +18,7 @@ from icha.datasets.surface_file import write_surface
 from icha.figures import against_load, at_one_load, contact_maps, indenters, loops, select
 from icha.figures.captions import units_of_shapes
 from icha.figures.drawn import caption_of, table_of
+from icha.figures.measured import read_measurements
 from icha.surfaces.shapes import Cone, CylinderPunch, Sphere
 
 SIDE, GRID, MODULUS, RADIUS = 40e-6, 40, 1e6, 1e-3
@@ -178,10 +179,10 @@ def test_fig5_draws_a_measurement_of_a_rough_sphere_where_the_run_is(tmp_path):
     campaign, at = tree_of(run), int(np.argmax(run["step_kind"].values == "indentation"))
     pressure, area = (float(run[name][at]) for name in ("nominal_pressure", "contact_area_fraction"))
     (tmp_path / "own.csv").write_text(f"p,a\n{pressure!r},{area!r}\n")
-    known = {"columns": {"p": 1.0, "a": 1.0}, "label": "own", "citation": "A. Author (2000)"}
-    known |= {"material": "soft", "rms_slope": None}
-    options = {"study": "press", "measurements": [known | {"contact_modulus": MODULUS}]}
-    figure = against_load.multi_slope(campaign, [tmp_path / "own.csv"], **options)
+    known = {"columns": {"p": 1.0, "a": 1.0}, "label": "own", "citation": "A. Author (2000)", "material": "soft"}
+    known |= {"quantities": ["load", "area"], "contact_modulus": MODULUS}
+    measurements = read_measurements([tmp_path / "own.csv"], [known])
+    figure = against_load.multi_slope(campaign, study="press", measurements=measurements)
     for ax, value in zip(figure.axes, (area, area / pressure * MODULUS), strict=True):
         assert ax.get_xlabel().startswith("relative load")
         measured = [line for line in ax.get_lines() if line.get_label() == "own"]
@@ -205,7 +206,7 @@ def test_measurements_of_indenters_are_drawn_in_the_units_of_the_figures(campaig
     known |= {"columns": dict(zip(columns, (1e-3, 1e-6, 1e-6, 1e-9, 1e-3), strict=True)), "quantities": [*columns]}
 
     def drawn(draw):
-        fig = draw(campaign, [tmp_path / "own.csv"], study="press", measurements=[known])
+        fig = draw(campaign, study="press", measurements=read_measurements([tmp_path / "own.csv"], [known]))
         assert "Crosses are measurements: own (A. Author (2000))." in caption_of(fig)
         shown = [[each for each in ax.get_lines() if each.get_marker() == "x"] for ax in fig.axes]
         return fig, [np.concatenate([each.get_xydata() for each in found]) for found in shown]
