@@ -106,13 +106,8 @@ class StudyFigure(FigureRequest):
     study: Name = Field(description="Name of the study that is drawn.")
 
     def _option_problems(self, campaign, study):
-        for key, present in (
-            ("surface", study.surfaces),
-            ("seed", study.seeds),
-            ("material", study.materials),
-            ("rms_slope", study.rms_slopes),
-        ):
-            value = getattr(self, key, None)
+        for key in ("surface", "seed", "material", "rms_slope"):
+            value, present = getattr(self, key, None), getattr(study, f"{key}s")
             if value is not None and value not in present:
                 yield (key,), value, f"is not in study {self.study!r}; expected one of {list_names(present)}"
 

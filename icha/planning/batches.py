@@ -91,16 +91,12 @@ def largest_grid(campaign: Campaign) -> int:
 
 def _by_seed(files: Mapping[str, T], labels: Callable[[T], tuple[str, int]]) -> list[tuple[str, T]]:
     """Sort files by the position of their seed among the seeds of the same name; `labels` gives name and seed."""
-    positions: dict[str, dict[int, int]] = {}
-    for name, seed in map(labels, files.values()):
-        of_name = positions.setdefault(name, {})
-        of_name.setdefault(seed, len(of_name))
-
-    def position(item: tuple[str, T]) -> int:
-        name, seed = labels(item[1])
-        return positions[name][seed]
-
-    return sorted(files.items(), key=position)
+    seeds: dict[str, dict[int, int]] = {}
+    positions = {}
+    for path, (name, seed) in zip(files, map(labels, files.values()), strict=True):
+        of_name = seeds.setdefault(name, {})
+        positions[path] = of_name.setdefault(seed, len(of_name))
+    return sorted(files.items(), key=lambda item: positions[item[0]])
 
 
 def _divide(files: Iterable[tuple[str, str, costs.Cost]]) -> list[Batch]:
