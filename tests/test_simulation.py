@@ -141,7 +141,9 @@ def test_a_snapshot_that_is_not_finite_ends_a_cycle_with_what_was_reached(monkey
     assert int(reached.jump_in_count[-1]) == np.count_nonzero(reached.event_kind == 0) > 0
 
 
-def test_arguments_with_a_wrong_unit_give_a_warning():
+def test_arguments_with_a_wrong_unit_and_models_that_are_not_applicable_give_a_warning():
+    with pytest.warns(IchaWarning, match="asperity model not applicable: mean gap of 0.2 rms heights"):
+        simulate(rough(), Material(1e6, 0.0), Path(mean_separations=[0.2 * rough().rms_height]))
     fine = rough(32, ratio=8, slope=0.3)
     with pytest.warns(IchaWarning, match=r"rms_slope: 3e\+08 is unusual; expected 1e-4 to 5 .* SI units") as raised:
         Surface(fine.heights * 1e9, PERIOD)
@@ -192,11 +194,6 @@ def test_snapshots_at_states_of_the_last_unloading(model):
     assert problems_with_file(RUN, run) == []
     with pytest.raises(ValueError, match=r"snapshots\[0\]: 0.01 is a state of unloading; expected `unload: true`"):
         Path([1e-2], snapshots=[("unloading_area_fraction", 0.01)])
-
-
-def test_a_model_that_is_not_applicable_gives_a_warning():
-    with pytest.warns(IchaWarning, match="asperity model not applicable: mean gap of 0.2 rms heights"):
-        simulate(rough(), Material(1e6, 0.0), Path(mean_separations=[0.2 * rough().rms_height]))
 
 
 def test_a_run_ends_where_the_contact_of_a_shape_reaches_the_edge_of_its_square():

@@ -56,19 +56,13 @@ def test_known_numbers():
     assert float(five.confidence) == pytest.approx(2.7764451 * np.sqrt(2.5 / 5), rel=1e-7)
     two = ensemble([1.0, 3.0])
     assert float(two.confidence) == pytest.approx(12.7062047, rel=1e-7)
-
-
-def test_bands_hold_the_mean_nineteen_times_of_twenty():
-    rng = np.random.default_rng(2)
-    over = ensemble(rng.normal(1.0, 3.0, (4, 40000)))
+    # Bands hold the mean nineteen times of twenty.
+    over = ensemble(np.random.default_rng(2).normal(1.0, 3.0, (4, 40000)))
     held = np.mean(np.abs(over.mean - 1.0) <= over.confidence)
     assert held == pytest.approx(0.95, abs=4 * np.sqrt(0.05 * 0.95 / 40000))
-
-
-def test_members_without_a_value_do_not_count():
+    # Members without a value do not count.
     over = ensemble([[1.0, np.nan, np.nan], [3.0, 5.0, np.nan]])
-    np.testing.assert_array_equal(over.count, [2, 1, 0])
-    np.testing.assert_array_equal(over.mean, [2.0, 5.0, np.nan])
+    np.testing.assert_array_equal([over.count, over.mean], [[2, 1, 0], [2.0, 5.0, np.nan]])
     assert np.isfinite(over.confidence).tolist() == np.isfinite(over.deviation).tolist() == [True, False, False]
 
 

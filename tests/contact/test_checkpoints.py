@@ -96,14 +96,11 @@ def test_of_another_contact_or_path_nothing_is_found_but_what_both_share(monkeyp
         assert computed == needed - same
 
 
-def test_of_other_programs_nothing_is_found(monkeypatch, tmp_path):
+def test_of_other_programs_and_by_asperities_nothing_is_found(monkeypatch, tmp_path):
     folder = tmp_path / "kept"
     _, needed = followed(monkeypatch, "areas", folder, None)
     monkeypatch.setattr(contact, "version", lambda name: "0.0")
     _, computed = followed(monkeypatch, "areas", folder, None)
     assert computed == needed
-
-
-def test_asperities_keep_nothing(tmp_path):
     with pytest.raises(ValueError, match=r"^kept: the model asperities has no checkpoints"):
         simulate(SURFACE, *PATHS["areas"], kept=tmp_path)

@@ -33,7 +33,7 @@ def test_every_folder_has_its_line_in_the_order_of_the_imports():
     assert level == sorted(level)
 
 
-def test_all_names_on_the_page_exist():
+def test_all_names_on_the_pages_on_layout_and_model_exist():
     code = re.findall(r"`([^`\n]+)`", re.sub(r"^```.*?^```$", "", LAYOUT, flags=re.DOTALL | re.MULTILINE))
     files = {each for each in code if "<" not in each and re.fullmatch(r"[.\w]+(/[\w.]+)+|\w+\.toml", each)}
     assert len(files) > 30
@@ -44,26 +44,17 @@ def test_all_names_on_the_page_exist():
             importlib.import_module(name)
         except ModuleNotFoundError:
             assert hasattr(importlib.import_module(module), last), name
-
-
-def test_modules_on_the_page_on_the_model_exist():
     named = re.findall(r"`([\w.]+)`", " ".join(re.findall(r" \[(`[^\]]+`)\]", MODEL)))
     assert len(named) > 25
     assert not [name for name in named if importlib.util.find_spec(f"icha.{name}") is None]
 
 
-def test_every_named_test_exists():
+def test_the_page_on_trust_names_tests_commands_and_limits():
     existing = {path.name for path in (REPOSITORY / "tests").rglob("test_*.py")}
     assert set(re.findall(r"test_\w+\.py", THREATS)) <= existing
-
-
-def test_every_command_that_reads_files_is_listed():
     table = THREATS.partition("| command |")[2].partition("\n\n")[0]
     for name in get_command(app).commands:
         assert f"`{name}`" in table or f"`icha {name}`" in table, name
-
-
-def test_limits_are_those_of_the_code():
     assert f"more than the sum of {MOST_GROWTH} times its size and {ALLOWANCE // 10**6} MB" in THREATS
     assert f"have at most {LARGEST_TEXT // 10**6} MB" in THREATS
 

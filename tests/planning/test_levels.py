@@ -53,6 +53,10 @@ def test_the_cheapest_levels_that_reach_the_accuracy_are_chosen():
 def test_a_study_that_is_accurate_enough_needs_no_seeds():
     assert choice("30 %", THREE, TWO).counts == {}
     assert choice("30 %", THREE, TWO).sentence == "contact area ± 24 % (30 % required)"
+    # If areas are targets, the pressure is the result.
+    study = Study(targets={"area_fractions": [0.01]}, accuracy="4 %")
+    pressure = estimate(seeds=0.1, model=0.01, refinement=0.005, quantity="nominal_pressure")
+    assert choose_for_study("load", study, [pressure, pressure], COSTS, 1).quantity == "nominal_pressure"
 
 
 def test_a_budget_on_more_cores_allows_more_seeds():
@@ -76,12 +80,6 @@ def test_reasons_why_an_accuracy_cannot_be_reached():
     other = estimate(seeds=0.1, model=0.01, refinement=0.005, quantity="mean_gap")
     found = choice("4 %", other, other)
     assert not np.isfinite(found.half_width) and "no run has a result for contact_area_fraction" in found.reason
-
-
-def test_areas_as_targets_ask_for_the_pressure():
-    study = Study(targets={"area_fractions": [0.01]}, accuracy="4 %")
-    pressure = estimate(seeds=0.1, model=0.01, refinement=0.005, quantity="nominal_pressure")
-    assert choose_for_study("load", study, [pressure, pressure], COSTS, 1).quantity == "nominal_pressure"
 
 
 def test_written_levels_replace_the_pilot_and_are_in_the_configuration_as_used(load, tmp_path):

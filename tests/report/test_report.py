@@ -107,14 +107,11 @@ def test_page_shows_statements_parameters_checks_and_captions(write):
     assert [row[1] for row in rows(text, "Studies")] == ["4 of 4", "2 of 2"]
 
 
-def test_the_error_of_the_model_is_a_statement(write):
+def test_the_error_of_the_model_is_a_statement_and_failed_checks_are_listed(write):
     errors = compared.errors()
     (statement,) = measured_errors(errors).values()
     assert f"<b>error</b>: {statement.text}." in write(campaign=compared.tree(), model_error=errors)
     assert "<b>error</b>" not in write()
-
-
-def test_failed_checks_are_listed(write):
     failed = Check("residual", 1e-3, 1e-8, False, "largest equilibrium error over h_rms", "slopes/rough")
     text = write(checks=[failed])
     assert "1 of 1</b> checks of the solved equations failed" in text

@@ -172,6 +172,7 @@ def test_points_of_a_sphere_have_the_distance_of_its_radius_from_the_centre():
     np.testing.assert_allclose(np.sqrt(x**2 + y**2 + (Sphere(1.0).heights(x, y) + 1.0) ** 2), 1.0, rtol=1e-14)
     with pytest.raises(ValueError, match=r"radius: 0\.001 m is less than the distance of 0\.00141421 m .* larger"):
         Sphere(1e-3).heights(np.array([0.0, 1e-3]), np.array([0.0, 1e-3]))
+    assert ELLIPSOID.sphere_radius == pytest.approx(math.sqrt(10) * 1e-3, rel=1e-14)
 
 
 ELLIPSOID, CREST, TROUGH = Paraboloid([2e-3, 5e-3]), *SMOOTH[2:]
@@ -197,10 +198,6 @@ ELLIPSOID, CREST, TROUGH = Paraboloid([2e-3, 5e-3]), *SMOOTH[2:]
 )
 def test_heights_of_shapes(shape, x, y, height):
     assert shape.heights(x, y) == pytest.approx(height, rel=1e-12, abs=0)
-
-
-def test_the_radius_of_an_ellipsoid_is_the_geometric_mean():
-    assert ELLIPSOID.sphere_radius == pytest.approx(math.sqrt(10) * 1e-3, rel=1e-14)
 
 
 @pytest.mark.parametrize("shape", [Sphere(1e-3), Cone(1.4), *SMOOTH[2:]])

@@ -101,9 +101,6 @@ def test_every_answer_reaches_the_accuracy_and_levels_are_nested():
         width = half_width([each[answer] for each in per_seed.values()], found.values())
         assert width**2 + grid <= 0.02**2
     assert found["asperities"] >= found["coarse"] >= found["fine"] >= 2
-
-
-def test_an_accuracy_below_the_error_of_the_grid_is_refused():
     with pytest.raises(ValueError, match="the error of the grid is ± 3 %; expected a finer grid"):
         allocate({"fine": np.array([1e-4])}, np.array([9e-4]), COSTS, 0.02)
 

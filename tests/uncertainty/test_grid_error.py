@@ -32,15 +32,12 @@ def loops(cells):
     return campaign_tree(cyclic.pulls((1, 2), resolved))
 
 
-@pytest.mark.parametrize("variable", QUANTITIES)
-def test_laws_of_loops_are_those_of_the_measurements(variable):
-    law = loop_grid.fit_loops(loop_grid.read_measurements(), variable)
-    known = LOOP_ERRORS[variable]
-    assert (known.width, known.power, known.scatter) == pytest.approx((law.width, law.power, law.scatter), rel=0.01)
-
-
-def test_law_of_areas_is_that_of_the_measurements():
-    areas = loop_grid.areas_of(loop_grid.read_measurements())
+def test_laws_are_those_of_the_measurements():
+    measurements = loop_grid.read_measurements()
+    for variable in QUANTITIES:
+        law, known = loop_grid.fit_loops(measurements, variable), LOOP_ERRORS[variable]
+        assert (known.width, known.power, known.scatter) == pytest.approx((law.width, law.power, law.scatter), rel=0.01)
+    areas = loop_grid.areas_of(measurements)
     assert AREA_ERROR == pytest.approx(loop_grid.fit_areas(areas), rel=0.01)
     # Four of five errors at least are within two standard deviations.
     assert np.mean(np.abs(areas["error"]) < 2 * AREA_ERROR.at(areas["contact_cells"])) > 0.8

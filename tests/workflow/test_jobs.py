@@ -89,22 +89,16 @@ DATASET = xr.Dataset({"value": ((), 1.0, {"units": "1"})})
 
 
 def test_a_batch_computes_only_files_without_the_expected_stamp(batch, tmp_path):
-    assert batch("1", "1", "1") == ["a", "b", "c"]
+    # Files before an error of the machine are kept.
+    assert batch("1", "1", "1", failing=str(tmp_path / "b.nc")) == ["a", "failed"]
+    assert batch("1", "1", "1") == ["b", "c"]
+    with pytest.raises(ValueError, match="the program has changed since the campaign started; repeat the command"):
+        batch("1", "1", "1", present="2")
     assert batch("1", "1", "1") == []
     assert batch("1", "2", "1") == ["b"]
     os.truncate(tmp_path / "c.nc", (tmp_path / "c.nc").stat().st_size // 2)
     (tmp_path / "a.nc").unlink()
     assert batch("1", "2", "1") == ["a", "c"]
-
-
-def test_a_batch_refuses_a_program_that_changed_after_planning(batch):
-    with pytest.raises(ValueError, match="the program has changed since the campaign started; repeat the command"):
-        batch("1", "1", "1", present="2")
-
-
-def test_the_files_before_an_error_of_the_machine_are_kept(batch, tmp_path):
-    assert batch("1", "1", "1", failing=str(tmp_path / "b.nc")) == ["a", "failed"]
-    assert batch("1", "1", "1") == ["b", "c"]
 
 
 @pytest.fixture

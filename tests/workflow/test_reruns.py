@@ -72,31 +72,20 @@ def test_comments_docstrings_formatting_and_touch_run_nothing_nor_does_a_fresh_c
 
 
 @pytest.mark.parametrize(
-    ("path", "rules", "outdated"),
+    ("change", "rules", "outdated"),
     [
-        ("icha/boundary_elements/contact.py", {"run", *AFTER_RUNS}, 6),
-        ("icha/surfaces/spectrum.py", {"make_surfaces", "run", "compute_theories", *AFTER_RUNS}, 3 + 25 + 2),
-        ("icha/figures/loops.py", {"draw_figures", "report_page"}, 0),
+        # A new statement in a module.
+        (["icha/boundary_elements/contact.py"], {"run", *AFTER_RUNS}, 6),
+        (["icha/surfaces/spectrum.py"], {"make_surfaces", "run", "compute_theories", *AFTER_RUNS}, 3 + 25 + 2),
+        (["icha/figures/loops.py"], {"draw_figures", "report_page"}, 0),
+        ([SMOKE, "license: CC-BY-4.0", "license: CC0-1.0"], {"configuration", *AFTER_RUNS}, 0),
+        # The references contain curves of Fuller & Tabor for each material.
+        ([SMOKE, "2 mJ/m^2", "3 mJ/m^2"], {"configuration", "compute_theories", "run", *AFTER_RUNS}, 3 + 1),
+        ([SMOKE, "seeds: [1, 2]", "seeds: [1, 2, 3]"], {"configuration", "make_surfaces", "run", *AFTER_RUNS}, 0),
     ],
 )
-def test_a_new_statement_computes_again_what_its_module_computes(path, rules, outdated, own, edit):
-    edit(path)
-    assert planned(own) == (rules, outdated)
-
-
-@pytest.mark.parametrize(
-    ("changes", "rules", "outdated"),
-    [
-        ({"license: CC-BY-4.0": "license: CC0-1.0"},
-         {"configuration", *AFTER_RUNS}, 0),
-        # The references contain curves of Fuller & Tabor for each material.
-        ({"2 mJ/m^2": "3 mJ/m^2"}, {"configuration", "compute_theories", "run", *AFTER_RUNS}, 3 + 1),
-        ({"seeds: [1, 2]": "seeds: [1, 2, 3]"}, {"configuration", "make_surfaces", "run", *AFTER_RUNS}, 0),
-    ],
-)  # fmt: skip
-def test_a_changed_value_computes_again_what_depends_on_it(changes, rules, outdated, own, edit):
-    for old, new in changes.items():
-        edit(SMOKE, old, new)
+def test_what_depends_on_a_change_is_computed_again(change, rules, outdated, own, edit):
+    edit(*change)
     assert planned(own) == (rules, outdated)
 
 
