@@ -9,15 +9,27 @@ import pytest
 import yaml
 from demo_configuration import CARBERRY, GOOD, ORCID, REPOSITORY, measured_surface
 
-from icha.configuration.errors import ConfigurationError
+from icha.configuration.errors import MOST_PROBLEMS, ConfigurationError
 from icha.configuration.load import load_configuration
 from icha.configuration.yaml_files import dump_yaml, read_yaml
 
 
-def test_all_problems_are_reported_at_once(load):
+@pytest.mark.parametrize(
+    ("changes", "count", "last"),
+    [
+        ({"name": "A B", "surfaces.rough.hurst": 2, "materials.soft.surface_energy": "1 m", "extra": 1}, 4, ""),
+        ({f"key{i}": 1 for i in range(2000)}, MOST_PROBLEMS + 1, "there are more problems; correct these first"),
+        ({"studies.one.surfaces": [f"none{i}" for i in range(1000)]}, MOST_PROBLEMS + 1, "correct these first"),
+        ({"\x1b[2Jx": 1}, 1, ""),
+    ],
+    ids=range(4),
+)
+def test_all_problems_are_reported_at_once_without_control_characters(changes, count, last, load):
     with pytest.raises(ConfigurationError) as error:
-        load({"name": "A B", "surfaces.rough.hurst": 2, "materials.soft.surface_energy": "1 m", "extra": 1})
-    assert len(str(error.value).splitlines()) == 4
+        load(changes)
+    lines = str(error.value).splitlines()
+    assert len(lines) == count and lines[-1].endswith(last)
+    assert "\x1b" not in str(error.value) and ("\x1b[2Jx" not in changes or "\\x1b[2Jx: unknown key" in lines[0])
 
 
 def test_messages_name_the_line_and_the_value_as_written(tmp_path):

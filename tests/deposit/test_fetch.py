@@ -41,14 +41,11 @@ def assert_is_small(tree):
     assert float(tree[study]["contact_area_fraction"].max()) > 0 and tree.attrs["campaign"] == "small"
 
 
-def test_a_path_gives_the_dataset_in_memory(deposit):
+def test_a_path_gives_the_dataset_and_an_address_is_downloaded_once(deposit, server, tmp_path):
     for path in (deposit, str(deposit), f"{deposit}.zip"):
         assert_is_small(icha.fetch_deposit(path))
     with pytest.raises(FileNotFoundError, match="expected a DOI, a web address, or a path"):
         icha.fetch_deposit(deposit / "none.zip")
-
-
-def test_an_address_is_downloaded_once(deposit, server, tmp_path):
     address, requested = server
     for _ in range(2):
         assert_is_small(icha.fetch_deposit(f"{address}/small-1.0.zip", cache=tmp_path / "cache"))

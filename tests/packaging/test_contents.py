@@ -28,14 +28,10 @@ def test_every_file_of_the_repository_is_in_the_wheel_or_in_the_list_of_omitted_
         assert shipped is not (file.startswith(LEFT_OUT) and file not in listed), file
 
 
-def test_the_version_is_the_same_everywhere():
+def test_the_recipe_for_conda_has_the_version_and_the_requirements_of_the_package():
     cited = yaml.safe_load((REPOSITORY / "CITATION.cff").read_text(encoding="utf-8"))
     recipe = yaml.safe_load((REPOSITORY / "recipe/recipe.yaml").read_text(encoding="utf-8"))
     assert METADATA["version"] == cited["version"] == recipe["context"]["version"]
-
-
-def test_the_recipe_for_conda_has_the_requirements_of_the_package():
-    recipe = yaml.safe_load((REPOSITORY / "recipe/recipe.yaml").read_text(encoding="utf-8"))
     other_names = {"matplotlib": "matplotlib-base", "snakemake": "snakemake-minimal"}
     library, workflow = (output["requirements"]["run"] for output in recipe["outputs"])
     for there, asked in (

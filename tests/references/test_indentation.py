@@ -78,10 +78,7 @@ def test_cone_breaks_off_at_the_force_and_indentation_of_maugis_and_barquins():
     pull_off, jump_off = closed.cone_pull_off(1.5, MODULUS, WORK), closed.cone_jump_off(1.5, MODULUS, WORK)
     assert pull_off.force == pytest.approx(-54 * WORK**2 * tangent**3 / (math.pi * MODULUS), rel=1e-12)
     assert jump_off.indentation == pytest.approx(-WORK * tangent / MODULUS, rel=1e-12)
-
-
-def test_cone_without_adhesion_has_sneddons_force():
-    # F = (2/pi) E* tan(half angle) delta^2.
+    # Without adhesion, Sneddon: F = (2/pi) E* tan(half angle) delta^2.
     states = closed.cone_contact(RADII, 1.2, MODULUS)
     np.testing.assert_allclose(states.force, 2 / np.pi * MODULUS * math.tan(1.2) * states.indentation**2, rtol=1e-13)
 

@@ -166,14 +166,11 @@ def test_greenwood_williamson_is_the_sum_over_random_summits():
         assert float(theories.greenwood_williamson_pressure(u, MOMENTS)) == pytest.approx(force, rel=noise)
 
 
-def test_without_adhesion_it_is_greenwood_and_williamsons():
+def test_fuller_and_tabor_is_the_integral_over_the_heights_and_greenwood_and_williamson_without_adhesion():
     area = theories.fuller_tabor_area(SEPARATIONS, MOMENTS, BARE)
     pressure = theories.fuller_tabor_pressure(SEPARATIONS, MOMENTS, BARE)
     np.testing.assert_allclose(area, theories.greenwood_williamson_area(SEPARATIONS, MOMENTS), rtol=1e-10)
     np.testing.assert_allclose(pressure, theories.greenwood_williamson_pressure(SEPARATIONS, MOMENTS), rtol=1e-10)
-
-
-def test_it_is_the_integral_over_the_heights():
     theory = theories.gaussian_summits(MOMENTS)
     law, R = JKR(SOFT), theory.radius_of_curvature
 
