@@ -477,11 +477,8 @@ class MeasuredSurface(_SurfaceFromFile):
         settings["detrend"] = self.detrend or ("none" if self.boundary == "periodic" else "tilt")
         settings["size"] = self.size and (self.size[0], self.size[-1])
         settings["taper"] = (self.taper or 0.1) if self.boundary == "window" else None
-        if self.cutoff is None:
-            # Settings without this key have the same checksums as in earlier versions, so old results remain valid.
-            del settings["cutoff"]
-        # The same holds for keys that were added later and have their defaults.
-        defaults = {"columns": None, "scattered": "refuse", "outliers": "keep", "levelling": "none"}
+        # Without keys that were added later and have their defaults, checksums and old results remain valid.
+        defaults = {"cutoff": None, "columns": None, "scattered": "refuse", "outliers": "keep", "levelling": "none"}
         return {key: value for key, value in settings.items() if key not in defaults or value != defaults[key]}
 
 
