@@ -1,6 +1,5 @@
 """Figures of the user's own: what a script draws, and scripts that cannot draw."""
 
-import re
 import sys
 
 import pytest
@@ -83,31 +82,34 @@ def test_errors_of_a_script_name_its_line(draw, text, message, tmp_path):
     assert not (tmp_path / "mine.txt").exists()
 
 
+ENTRY = {"study": "one", "script": "mine.py"}
+
+
 @pytest.mark.parametrize(
-    ("text", "message"),
+    ("text", "name", "entry", "message"),
     [
-        (None, "no such file; expected a Python file"),
-        ("def draw(study:\n", "is not a Python file: "),
-        ("def plot(study):\n    pass\n", "has no function `draw`; expected `def draw(study):`"),
+        (None, "mine", ENTRY, "figures.mine.script: .* no such file; expected a Python file"),
+        ("def draw(study:\n", "mine", ENTRY, "figures.mine.script: .* is not a Python file: "),
+        ("pass\n", "mine", ENTRY, "figures.mine.script: .* has no function `draw`; expected `def draw.study.:`"),
+        (AREAS, "fig99_mine", ENTRY, "begins like the name of a figure of ICHA"),
+        (AREAS, "My figure", ENTRY, "is not a valid name"),
+        (
+            AREAS,
+            "fig2_area",
+            {"study": "one"},
+            "unknown key .did you mean 'fig2_area_and_gap'.*figure of your own",
+        ),
+        (AREAS, "mine", ENTRY | {"study": "two"}, "'two' is not defined"),
     ],
 )
-def test_scripts_are_refused_before_anything_is_computed(load, text, message, tmp_path):
+def test_own_figures_are_refused_before_anything_is_computed(load, text, name, entry, message, tmp_path):
     if text is not None:
         (tmp_path / "mine.py").write_text(text)
-    with pytest.raises(ValueError, match=f"figures.mine.script: .* {re.escape(message)}"):
-        load({"figures": {"mine": {"study": "one", "script": "mine.py"}}})
+    with pytest.raises(ValueError, match=message):
+        load({"figures": {name: entry}})
 
 
-def test_names_of_own_figures(load, tmp_path):
+def test_own_figures_stand_beside_others(load, tmp_path):
     (tmp_path / "mine.py").write_text(AREAS)
-    entry = {"study": "one", "script": "mine.py"}
-    figures = load({"figures": {"mine": entry, "fig1_jkr": {}}}).campaign.figures.by_name()
+    figures = load({"figures": {"mine": ENTRY, "fig1_jkr": {}}}).campaign.figures.by_name()
     assert list(figures) == ["fig1_jkr", "mine"] and isinstance(figures["mine"], OwnFigure)
-    for name, given, message in (
-        ("fig99_mine", entry, "begins like the name of a figure of ICHA"),
-        ("My figure", entry, "is not a valid name"),
-        ("fig2_area", {"study": "one"}, "unknown key .did you mean 'fig2_area_and_gap'.*or a figure of your own"),
-        ("mine", entry | {"study": "two"}, "'two' is not defined"),
-    ):
-        with pytest.raises(ValueError, match=message):
-            load({"figures": {name: given}})

@@ -35,17 +35,8 @@ class Table:
         self.quoted = self.delimiter != " " and random.random() < 0.2
         self.ending = self.delimiter if self.delimiter != " " and random.random() < 0.15 else ""
         self.hide_points()
-        formats = (
-            self.plain,
-            self.unknown,
-            self.gwyddion,
-            self.esri,
-            self.surfer,
-            self.zygo,
-            self.keyence,
-            self.points,
-        )
-        formats[random.integers(len(formats))]()
+        formats = "plain unknown gwyddion esri surfer zygo keyence points".split()
+        getattr(self, formats[random.integers(len(formats))])()
 
     def hide_points(self):
         """Remove points, and whole rows at the start, in the middle or at the end."""

@@ -52,22 +52,18 @@ def declare_points(path):
     path.write_text("".join(f"{x} {y} {x % 7}\n" for y in ends for x in ends))
 
 
-DECLARED = {
-    "scan.npy": declare_npy,
-    "scan.nc": declare_netcdf,
-    "scan.h5": declare_hdf5,
-    "scan.xyz": declare_points,
-}
+DECLARED = {"npy": declare_npy, "nc": declare_netcdf, "h5": declare_hdf5, "xyz": declare_points}
 
 
-@pytest.mark.parametrize("name", DECLARED)
-def test_declared_sizes_are_bounded_before_anything_is_read(name, tmp_path):
-    DECLARED[name](tmp_path / name)
+@pytest.mark.parametrize("ending", DECLARED)
+def test_declared_sizes_are_bounded_before_anything_is_read(ending, tmp_path):
+    path = tmp_path / f"scan.{ending}"
+    DECLARED[ending](path)
     with refused("path", r"needs about .*B of memory; expected at most 2 GB"):
-        scan(tmp_path / name, **LINES)
-    if name.endswith((".nc", ".npy")):
+        scan(path, **LINES)
+    if ending in ("nc", "npy"):
         with pytest.raises(ValueError, match=r"needs about .* at most 2 GB\. To allow more, .* ICHA_INPUT_MB"):
-            read_height_map(tmp_path / name, 1.0)
+            read_height_map(path, 1.0)
 
 
 def test_the_limit_can_be_raised_and_must_be_a_number(tmp_path, monkeypatch):
