@@ -10,6 +10,10 @@ import typer
 from icha.cli.project import UserError, echo
 from icha.support.formatting import format_count, printable
 
+_UNIT_OF_SHAPES = (
+    "with a shape, reduced pressures are in units of E* times `unit_slope`: the rms height of the shape over the side "
+    "of the square, not the rms slope of the roughness"
+)
 _ATTRIBUTES = ("summary", "campaign", "study", "contact_model", "boundary", "shape", "source_file", "preparation")
 
 
@@ -47,6 +51,8 @@ def _dataset(data) -> Iterator[str]:
     smooth = "unit_height" in data and not data["rms_height"]
     reduced = ("reduced_pressure", "reduced_separation", "largest_reduced_pressure") if smooth else ()
     yield from _quantities(data.drop_vars(reduced, errors="ignore"))
+    if "shape" in data and "reduced_pressure" in data and not smooth:
+        yield _UNIT_OF_SHAPES
     if "pull_off_force_over_jkr" in data:
         from icha.references.indenter_runs import BRANCHES, reason_without_fit
 
@@ -105,6 +111,8 @@ def _campaign(tree) -> Iterator[str]:
         )
         yield f"  models {', '.join(study['model'].values)}"
         yield from (f"  {line}" for line in _quantities(flat))
+        if "shape" in study and (study["shape"] != "").any():
+            yield f"  {_UNIT_OF_SHAPES}"
         if sentence := left_out_of_study(study).sentence:
             yield f"  results are of {sentence}"
         if reasons := reasons_not_applicable(study):

@@ -135,6 +135,7 @@ _SPHERES = """The theories of Hertz, and of Johnson, Kendall and Roberts (JKR), 
 the modulus and the works of adhesion of the runs in the same panel. The line of JKR includes states that are unstable
 under load control, up to the jump-off under displacement control. Runs without adhesion have no line of JKR; shapes
 without a radius and layers have no line."""
+_EQUIVALENT = "The radius R of a paraboloid is the geometric mean of its two radii, sqrt(R1 R2)."
 
 
 @in_style
@@ -175,7 +176,8 @@ def force_indentation(campaign: xr.DataTree, *, study: str, measurements: Sequen
         if len(shown) > 1:
             ax.set_title(of_panel[0].name, loc="right")
         ax.set(xlim=limits[0], ylim=limits[1])
-    say(fig, _SPHERES if theories else "")
+    if theories:
+        say(fig, _SPHERES, _radius_of_paraboloids(series))
     named = [] if len(shown) > 1 else series
     handles = {each.name: legend_handle(color=each.colour, **_LOOP) for each in named}
     handles |= {name: legend_handle(color=BLACK, ls=dashes, **_LOOP) for name, dashes in BRANCH_DASHES.items()}
@@ -203,7 +205,14 @@ def _theory_curves(run, largest_radius):
 
 # --- figure 18 ---
 
+
 # Variables of the works of adhesion; title of the panel and marker of the states.
+def _radius_of_paraboloids(series):
+    """Return what the radius of a paraboloid is, if a run of some series has this shape."""
+    shapes = {str(run["shape"].values) for each in series for run in each.runs.by_seed.values() if "shape" in run}
+    return _EQUIVALENT if any(shape.startswith("paraboloid of radii") for shape in shapes) else ""
+
+
 _TITLES = {"approach": ("loading", "o"), "retraction": ("unloading", "s")}
 _STATES = {"ls": "none", "ms": 2.8, "mew": 0.6, "mfc": "white"}
 _FIT = {"lw": 0.9, "ls": "-"}
@@ -241,7 +250,7 @@ def jkr_plot(campaign: xr.DataTree, *, study: str, measurements: Sequence[Measur
                 drawn.append((branch, each, labels, run, x[inside], y[inside]))
     scale, unit = choose_unit(max(float(np.abs(x).max(initial=0.0)) for *_, x, _ in drawn), "N")
     fig, [panels] = new_panels(3.0, sharex=True, sharey=True)
-    say(fig, _LINE, _FITS)
+    say(fig, _LINE, _FITS, _radius_of_paraboloids(series))
     for branch, each, labels, run, x, y in drawn:
         ax = panels[list(_TITLES).index(branch)]
         plot(ax, x * scale, y * 1e3, Name("states", labels), marker=_TITLES[branch][1], mec=each.colour, **_STATES)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from icha.asperity.full_contact import HIGH_PULL_OFF_BELOW, full_contact_energy_ratio
 from icha.asperity.material import VAN_DER_WAALS_RANGE, Material
@@ -42,6 +43,9 @@ _MOST_FORCE = 12.0
 # A table is sorted if one of its columns never decreases, although another one does before the largest force: by more
 # than the first number times its range, at more than the second number times the number of points.
 _DECREASE, _DECREASES = 0.1, 0.1
+# Number of neighbours of a median; least rise of these medians in a second loading, as a share of the largest force
+# and in units of the median distance of the points from them.
+_MEDIAN, _RISE, _CLEAR_RISE = 5, 0.15, 10.0
 # Neighbouring residuals are not random if their correlation exceeds the first number, and the second number divided by
 # the root of the number of points. Smaller residuals than the third number, in units of the errors, are rounded.
 _CORRELATION, _BY_CHANCE, _ROUNDING = 0.3, 2.5, 1e-4
@@ -265,10 +269,19 @@ def _sorted_column(values, top):
 
 
 def _second_loading(force):
-    """Return the first point of a second loading, with more than half the largest force; None without one."""
+    """Return the first point of a second loading; None without one.
+
+    It has more than half the largest force; or, after this force, medians of neighbours rise by much more than noise to
+    a force in compression.
+    """
     high, low = force > 0.5 * force.max(), force < 0.25 * force.max()
     end = np.argmax(high) + np.flatnonzero(low[np.argmax(high) :])
     again = end[0] + np.flatnonzero(high[end[0] :]) if end.size else end
+    if not again.size:
+        middle, top = median_filter(force, _MEDIAN), int(np.argmax(force))
+        clear = max(_RISE * force.max(), _CLEAR_RISE * float(np.median(np.abs(force - middle))))
+        rise = middle[top:] - np.minimum.accumulate(middle[top:])
+        again = top + np.flatnonzero((rise > clear) & (middle[top:] > clear))
     return int(again[0]) if again.size else None
 
 
@@ -312,7 +325,10 @@ def _warnings(test, errors, interaction_range, thickness, roughness) -> Iterator
             f"at least about {1e3 * rate:.3g} mJ/m². Measure up to pull-off, or load less"
         )
     elif test.receding_work.value < advancing:
-        yield "the receding work of adhesion is less than the advancing one, which no law of adhesion explains"
+        yield (
+            "the receding work of adhesion is less than the advancing one, which no law of adhesion explains; check "
+            "that the points are in the order of the test, not in the reverse order"
+        )
     force, pull_off = float(test.measured["force"].max()), 1.5 * math.pi * test.radius * work
     if force > _MOST_FORCE * pull_off:
         yield (

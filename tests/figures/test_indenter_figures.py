@@ -19,7 +19,7 @@ from icha.figures import against_load, at_one_load, contact_maps, indenters, loo
 from icha.figures.captions import units_of_shapes
 from icha.figures.drawn import caption_of, table_of
 from icha.figures.measured import read_measurements
-from icha.surfaces.shapes import Cone, CylinderPunch, Sphere
+from icha.surfaces.shapes import Cone, CylinderPunch, Paraboloid, Sphere
 
 SIDE, GRID, MODULUS, RADIUS = 40e-6, 40, 1e6, 1e-3
 ENERGY = (4e-6) ** 3 * MODULUS / RADIUS**2
@@ -85,6 +85,10 @@ def test_the_line_of_jkr_leaves_out_shapes_without_a_radius():
         for line, other in zip(lines(ax), lines(expected), strict=True):
             np.testing.assert_allclose(line, other)
     assert "on shapes without a radius, and on layers are left out" in caption_of(fig)
+    assert "sqrt(R1 R2)" not in caption_of(fig)
+    paraboloid = tree_of(press(shape=Paraboloid((RADIUS, 2 * RADIUS))))
+    for draw in FIGURES[:2]:
+        assert "geometric mean of its two radii, sqrt(R1 R2)" in caption_of(draw(paraboloid, study="press"))
 
 
 @pytest.fixture(scope="module")
@@ -141,6 +145,8 @@ def test_states_beyond_jkr_do_not_spoil_the_axes_and_spheres_of_long_range_have_
     write_dataset(run, tmp_path / "run.nc")
     shown = CliRunner().invoke(app, ["show", str(tmp_path / "run.nc")]).output
     assert "work of adhesion on approach: no fit (Tabor parameter 0.3 below 3)" in shown
+    write_dataset(press(rms=1e-8), tmp_path / "rough.nc")
+    assert "rms height of the shape" in CliRunner().invoke(app, ["show", str(tmp_path / "rough.nc")]).output
     # There are no reduced values of a smooth shape, and values of full contact are those of the roughness.
     assert "reduced_" not in shown and shown.count("of the roughness alone") == 2
     assert loops.loops(tree, study="press").axes[0].get_xlabel().startswith(label_of("mean_separation"))

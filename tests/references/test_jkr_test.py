@@ -196,6 +196,14 @@ def test_tables_that_are_no_jkr_test_are_refused(text, message, tmp_path):
     assert message in str(error.value)
 
 
+@pytest.mark.parametrize("load", [2e-3, 4e-3])
+def test_a_second_cycle_to_a_lower_load_is_refused(load):
+    cycles = [exact_test(points=40), exact_test(points=30, load=load)]
+    table = {name: np.concatenate([cycle[name] for cycle in cycles]) for name in ("force", "contact_radius")}
+    with pytest.raises(ValueError, match=r"point \d+: the force rises for the second time"):
+        icha.fit_jkr_test(table, RADIUS)
+
+
 @pytest.mark.parametrize(
     ("name", "point", "factor"), [("force", 15, 10), ("contact_radius", 5, 6), ("contact_radius", 30, 0.6)]
 )
