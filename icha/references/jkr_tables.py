@@ -37,9 +37,9 @@ _BRANCH = f"expected {_LOADING[0]} or {_UNLOADING[0]} (also {', '.join(_LOADING[
 
 # A number that exceeds every other one in its column by this factor is not a measured value.
 _FAR = 30
-# Nor is one whose distance from the median of five neighbours exceeds this share of the range of the medians, and this
-# multiple of the median distance. At jumps and at the turning point of a test, the distance is about one step.
-_SPIKE, _USUAL_SPIKES, _NEIGHBOURS = 0.5, 30, 5
+# Nor is one whose distance from the median of five neighbours exceeds this multiple of the range of the medians, and of
+# the median distance. At the turning point of a test the distance is about one step, at a jump-in less than the range.
+_SPIKE, _USUAL_SPIKES, _NEIGHBOURS = 1.0, 30, 5
 # Largest number of points that a message names.
 _NAMED = 5
 

@@ -43,8 +43,8 @@ _MOST_FORCE = 12.0
 # A table is sorted if one of its columns never decreases, although another one does before the largest force: by more
 # than the first number times its range, at more than the second number times the number of points.
 _DECREASE, _DECREASES = 0.1, 0.1
-# Number of neighbours of a median; least rise of these medians in a second loading, as a share of the largest force
-# and in units of the median distance of the points from them.
+# Number of neighbours of a median; least rise of these medians in a second loading, as a share of the range of
+# the forces, and in units of the median distance of the points from them.
 _MEDIAN, _RISE, _CLEAR_RISE = 5, 0.15, 10.0
 # Neighbouring residuals are not random if their correlation exceeds the first number, and the second number divided by
 # the root of the number of points. Smaller residuals than the third number, in units of the errors, are rounded.
@@ -230,7 +230,7 @@ def _choose_points(points: Points, radius: float) -> tuple[np.ndarray, np.ndarra
     if points.unloading is None and (again := _second_loading(force)) is not None:
         raise ValueError(
             f"{places[again]}: the force rises for the second time; expected one loading and one unloading. Select the "
-            "points of one cycle"
+            f"points of one cycle, and check the largest force, {places[top]}"
         )
     unloading = np.arange(len(force)) > top if points.unloading is None else points.unloading
     if contact is not None:
@@ -279,7 +279,7 @@ def _second_loading(force):
     again = end[0] + np.flatnonzero(high[end[0] :]) if end.size else end
     if not again.size:
         middle, top = median_filter(force, _MEDIAN), int(np.argmax(force))
-        clear = max(_RISE * force.max(), _CLEAR_RISE * float(np.median(np.abs(force - middle))))
+        clear = max(_RISE * np.ptp(force), _CLEAR_RISE * float(np.median(np.abs(force - middle))))
         rise = middle[top:] - np.minimum.accumulate(middle[top:])
         again = top + np.flatnonzero((rise > clear) & (middle[top:] > clear))
     return int(again[0]) if again.size else None
