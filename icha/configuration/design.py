@@ -158,20 +158,17 @@ def _study_problems(campaign: Campaign, label: str, study: Study) -> Iterator[Pr
         located = (((*prefix, "cases", index, one), getattr(case, one)) for index, case in enumerate(cases))
         return [*lists[one], *((location, value) for location, value in located if value is not None)]
 
+    surfaces = [campaign.surfaces.get(name) for _, name in values("surface")]
+    sampled, smooth = _samples_slopes(study), all(surface and surface.smooth for surface in surfaces)
     for many, one in _LISTS.items():
         needed = not cases or any(getattr(case, one) is None for case in cases)
-        if one == "rms_slope" and _samples_slopes(study):
+        if one == "rms_slope" and (sampled or smooth or study.rms_heights is not None):
             needed = False
-        elif one == "rms_slope":
-            names = (campaign.surfaces.get(name) for _, name in values("surface"))
-            needed = needed and not all(surface and surface.smooth for surface in names)
-            if study.rms_heights is not None:
-                needed = False
-                if study.rms_slopes:
-                    yield (*prefix, many), study.rms_slopes, "is given beside `rms_heights`; expected one of both"
         if needed and not getattr(study, many):
             description = " ".join(str(Study.model_fields[many].description).split())
             yield (*prefix, many), NOTHING, f"the key is missing; expected: {description}"
+    if study.rms_heights is not None and study.rms_slopes and not sampled:
+        yield (*prefix, "rms_slopes"), study.rms_slopes, "is given beside `rms_heights`; expected one of both"
     for one, names in (("surface", campaign.surfaces), ("material", campaign.materials)):
         for location, name in values(one):
             if name not in names:
