@@ -55,16 +55,18 @@ def test_a_script_draws_a_figure_with_its_docstring_as_caption(draw, tmp_path):
 
 
 def test_a_script_imports_modules_beside_it(draw, tmp_path):
-    (tmp_path / "labels.py").write_text("from plots.units import AREA\n")
     (tmp_path / "plots").mkdir()
-    (tmp_path / "plots/__init__.py").write_text("")
-    (tmp_path / "plots/units.py").write_text("from . import more\nAREA = 'area'\n")
-    (tmp_path / "plots/more.py").write_text("import numpy\n")
-    (tmp_path / "unused.py").write_text("not Python")
+    imported = {
+        "labels.py": "from plots.units import AREA\n",
+        "plots/__init__.py": "",
+        "plots/more.py": "import numpy\n",
+        "plots/units.py": "from . import more\nAREA = 'area'\n",
+    }
+    for name, content in (imported | {"unused.py": "not Python"}).items():
+        (tmp_path / name).write_text(content)
     text = AREAS.replace("    return figure", "    import labels\n    axes.set_ylabel(labels.AREA)\n    return figure")
     draw(text)
-    names = ["labels.py", "plots/__init__.py", "plots/more.py", "plots/units.py"]
-    assert modules_of(tmp_path / "mine.py") == [tmp_path / name for name in names]
+    assert modules_of(tmp_path / "mine.py") == [tmp_path / name for name in imported]
     assert not list(tmp_path.rglob("__pycache__"))
 
 

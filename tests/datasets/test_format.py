@@ -42,12 +42,6 @@ def problems(kind, data):
     return "\n".join(problems_with_file(kind, data))
 
 
-def test_what_is_written_keeps_to_the_format(files):
-    for name, kind in (("run", RUN), ("surface", SURFACE), ("campaign", CAMPAIGN)):
-        found, data = identify_file(files / f"{name}.nc")
-        assert found == kind and problems(kind, data) == ""
-
-
 def test_the_vocabulary_keeps_what_is_promised():
     """Names, dimensions and units that users rely on: a change of them is one of the format."""
     tables = {RUN: of_run.RUN | of_run.OF_MODELS | of_run.CYCLE | of_run.LOOP, SURFACE: of_surface.SURFACE}
@@ -83,7 +77,10 @@ def test_changes_of_a_run_are_found(spoil, problem):
         assert problem in problems(RUN, spoil(small.run()))
 
 
-def test_changes_of_surfaces_and_campaigns_are_found(files):
+def test_what_is_written_keeps_to_the_format_and_changes_are_found(files):
+    for name, kind in (("run", RUN), ("surface", SURFACE), ("campaign", CAMPAIGN)):
+        found, data = identify_file(files / f"{name}.nc")
+        assert found == kind and problems(kind, data) == ""
     _, surface = identify_file(files / "surface.nc")
     assert "height: has the shape (31, 32)" in problems(SURFACE, surface.isel(y=slice(1, None)))
     _, tree = identify_file(files / "campaign.nc")

@@ -219,20 +219,23 @@ def _conical(seed):
     return _smooth(seed) / 30 - 1e-5 * np.hypot((4 * x) % 1 - 0.5, (4 * y) % 1 - 0.5)
 
 
+def _white(seed):
+    return np.random.default_rng(seed).standard_normal((32, 32)) * 1e-7
+
+
 @pytest.mark.parametrize(
-    ("make", "energy", "marked"), [(_worn, 5e-3, True), (_conical, 0.0, True), (_smooth, 5e-3, False)]
+    ("make", "energy", "model", "marked"),
+    [
+        (_worn, 5e-3, "asperities", "not parabolic"),
+        (_conical, 0.0, "asperities", "not parabolic"),
+        (_smooth, 5e-3, "asperities", ""),
+        (_white, 0.0, "boundary_elements", "cells per shortest wave"),
+        (_smooth, 0.0, "boundary_elements", ""),
+    ],
 )
-def test_runs_on_tops_that_are_not_parabolic_are_marked(make, energy, marked):
-    material = Material(2e6, energy, 2e-9)
-    for seed in (1, 2, 3):
-        surface = Surface(make(seed), PERIOD).scaled_to_rms_slope(0.3)
-        run = simulate(surface, material, Path(reduced_pressures=[1e-3, 1e-2], snapshots=[]))
-        assert ("not parabolic" in run.attrs["applicability"]) == marked
-
-
-def test_boundary_elements_are_marked_where_cells_are_too_few():
-    white = np.random.default_rng(1).standard_normal((32, 32)) * 1e-7
-    for heights, marked in ((white, True), (_smooth(1), False)):
-        surface = Surface(heights, PERIOD).scaled_to_rms_slope(0.3)
-        run = simulate(surface, Material(2e6, 0.0, 2e-9), Path(reduced_pressures=[1e-2]), model="boundary_elements")
-        assert ("cells per shortest wave" in run.attrs["applicability"]) == marked
+def test_runs_on_tops_that_are_not_parabolic_and_on_too_few_cells_are_marked(make, energy, model, marked):
+    material, path = Material(2e6, energy, 2e-9), Path(reduced_pressures=[1e-3, 1e-2], snapshots=[])
+    for seed in (1, 2, 3) if model == "asperities" else (1,):
+        run = simulate(Surface(make(seed), PERIOD).scaled_to_rms_slope(0.3), material, path, model=model)
+        found = [each for each in ("not parabolic", "cells per shortest wave") if each in run.attrs["applicability"]]
+        assert found == [marked] * (marked != "")
