@@ -108,7 +108,11 @@ def _cut(text: str, most: int) -> str:
 
 def problem_of(details: Mapping) -> Problem:
     """Convert the details of a pydantic error into location (keys), value and reason."""
-    location, value, kind = _without_tags(details["loc"]), details["input"], details["type"]
+    location, value, kind = details["loc"], details["input"], details["type"]
+    # Pydantic adds the kind of a surface, and the marker `[key]`.
+    if len(location) > 2 and location[0] == "surfaces" and location[2] in SURFACE_KINDS:
+        location = (*location[:2], *location[3:])
+    location = location[:-1] if location[-1:] == ("[key]",) else location
     context = details.get("ctx", {})
     if kind == "value_error":
         reason = str(context["error"])
@@ -151,13 +155,6 @@ def _hint(name: str, section: type[BaseModel]) -> str:
         return f" (did you mean `{keys[0]}` of a study?{because})"
     similar = known or difflib.get_close_matches(name, section.model_fields, 1)
     return f" (did you mean {similar[0]!r}?{because if known else ''})" if similar else ""
-
-
-def _without_tags(location: tuple) -> tuple:
-    """Remove the parts that pydantic adds to a location: the kind of a surface, and the marker `[key]`."""
-    if len(location) > 2 and location[0] == "surfaces" and location[2] in SURFACE_KINDS:
-        location = (*location[:2], *location[3:])
-    return location[:-1] if location[-1:] == ("[key]",) else location
 
 
 def _section_at(location: tuple) -> type[BaseModel]:

@@ -106,7 +106,11 @@ def unusual_in_campaign(campaign: Campaign) -> Iterator[Unusual]:
         location = "surfaces", campaign.origin("surfaces", name)
         section = campaign.surfaces[name]
         yield from unusual_topography(location, section, each.period, each.rms_slope, each.repeated_height)
-    yield from _unusual_maps(campaign)
+    for name, material in campaign.materials.items():
+        if material.adhesion_map and not USUAL["surface_energy"].contains(material.surface_energy):
+            location = "materials", campaign.origin("materials", name), "surface_energy"
+            value = formatting.format_quantity(material.surface_energy, "J/m^2")
+            yield Unusual(location, value, USUAL["surface_energy"], ", the mean of the map")
     yield from _first_of_each_study(campaign, _unusual_heights, _negligible_loads, _mirrored_forces)
     yield from _coarse_grids(campaign)
 
@@ -121,15 +125,6 @@ def _first_of_each_study(campaign, *checks):
     """Yield the first value that each check finds in each study of the user."""
     for check, name in itertools.product(checks, campaign.own_studies):
         yield from itertools.islice(check(campaign, name), 1)
-
-
-def _unusual_maps(campaign: Campaign) -> Iterator[Unusual]:
-    """Yield the mean of each map of works of adhesion if it is unusual."""
-    for name, section in campaign.materials.items():
-        if section.adhesion_map and not USUAL["surface_energy"].contains(section.surface_energy):
-            value = formatting.format_quantity(section.surface_energy, "J/m^2")
-            location = "materials", campaign.origin("materials", name), "surface_energy"
-            yield Unusual(location, value, USUAL["surface_energy"], ", the mean of the map")
 
 
 def plausibility_problems(
