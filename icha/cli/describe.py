@@ -46,29 +46,22 @@ def describe(
 
 
 def _print_scans(campaign, plots: Path | None) -> None:
-    """Print the descriptions of the measured surfaces that studies use; draw them to the folder `plots`, if given."""
+    """Print what the files of surfaces contain; draw measured surfaces to the folder `plots`, if given."""
     from icha.configuration.surfaces import MeasuredSurface, SpectrumSurface
     from icha.contact.models import MODELS
 
-    models: dict[str, list] = {}
-    for case in campaign.all_runs:
-        if isinstance(campaign.surfaces[case.surface], MeasuredSurface):
-            models.setdefault(case.surface, []).append(MODELS[case.model])
     for name in campaign.used_surfaces:
-        if isinstance(section := campaign.surfaces[name], SpectrumSurface):
-            for line in _spectrum_lines(section):
-                echo(f"{name}: {line}")
-    if not models:
-        return
-    from icha.surfaces.measured.resolution import examine_scan
-
-    echo()
-    for name, used in models.items():
         section = campaign.surfaces[name]
-        for line in describe_scan(name, examine_scan(section.path, section.preparation), models=used):
-            echo(line)
-        if plots is not None:
-            _draw_scan(section, plots / f"scan_{name}.png")
+        if isinstance(section, SpectrumSurface):
+            echo("\n".join(f"{name}: {line}" for line in _spectrum_lines(section)))
+        elif isinstance(section, MeasuredSurface):
+            from icha.surfaces.measured.resolution import examine_scan
+
+            models = [MODELS[run.model] for run in campaign.all_runs if run.surface == name]
+            lines = describe_scan(name, examine_scan(section.path, section.preparation), models=models)
+            echo("\n".join(["", *lines]))
+            if plots is not None:
+                _draw_scan(section, plots / f"scan_{name}.png")
 
 
 def _spectrum_lines(section):
