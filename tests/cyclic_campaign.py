@@ -103,7 +103,7 @@ PULL = RunLabels("pull", "boundary_elements", "rough", 1, 1.0, "soft")
 
 
 def pulls(seeds, change=lambda seed, run: run):
-    """Return labels and runs of loops as by boundary elements, each changed by a function of its seed."""
+    """Return labels and runs of loops of boundary elements, each changed by a function of seed and run."""
     tension = xr.Variable((), 1.0, {"units": "Pa", "long_name": "test"})
     return [
         (

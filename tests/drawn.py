@@ -1,4 +1,11 @@
-"""What a figure shows."""
+"""Figures of studies, and what they show."""
+
+from icha.figures import against_parameter
+
+
+def draw(module, tree, study):
+    """Draw a study with a function of one study or of several."""
+    return module(tree, **({"studies": [study]} if module is against_parameter.loss else {"study": study}))
 
 
 def legend(figure):

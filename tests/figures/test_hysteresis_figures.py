@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import small_campaign as small
 import xarray as xr
-from drawn import legend
+from drawn import draw, legend
 from matplotlib.colors import to_hex
 from scipy.interpolate import CubicHermiteSpline
 
@@ -54,10 +54,6 @@ def one(material="soft", **changed):
     """A study of a single run."""
     ((labels, run),) = study("one", materials=(material,), seeds=(1,))
     return campaign_tree([(labels, run.assign(changed))])
-
-
-def draw(module, tree, study):
-    return module(tree, **({"studies": [study]} if module is against_parameter.loss else {"study": study}))
 
 
 def snap_map(tree, surface, study="one"):

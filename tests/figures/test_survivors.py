@@ -4,7 +4,7 @@ import cyclic_campaign as cyclic
 import numpy as np
 import pytest
 import small_campaign as small
-from drawn import legend, lines_of
+from drawn import draw, legend, lines_of
 
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import RunLabels
@@ -40,10 +40,6 @@ def campaign(failed=None, checks=None, pale=(), lacking=(), run=small.run):
     )
 
 
-def draw(module, tree):
-    return module(tree, **{"studies": ["five"]} if module is against_parameter.loss else {"study": "five"})
-
-
 def crossed(axes):
     return [line for line in axes.get_lines() if line.get_label() == FEWER_SEEDS]
 
@@ -51,15 +47,15 @@ def crossed(axes):
 @pytest.mark.parametrize("module", [against_load.area_and_gap, against_parameter.loss])
 def test_means_over_fewer_seeds_are_crossed_and_runs_not_applicable_are_pale(module):
     run = cyclic.run if module is against_parameter.loss else small.run
-    figure = draw(module, campaign(lacking=(2,), checks=(4,), pale=(5,), run=run))
+    figure = draw(module, campaign(lacking=(2,), checks=(4,), pale=(5,), run=run), "five")
     axes = figure.axes[0]
-    assert crossed(axes) and not crossed(draw(module, campaign(run=run)).axes[0])
+    assert crossed(axes) and not crossed(draw(module, campaign(run=run), "five").axes[0])
     for cross in crossed(axes):
         marked = [line for line in lines_of(axes) if line.get_marker() != "x"]
         assert any(np.isin(cross.get_xdata(), line.get_xdata()).all() for line in marked)
     assert legend(figure).count(FEWER_SEEDS) == legend(figure).count(f"pale: {NOT_APPLICABLE}") == 1
     if module is against_parameter.loss:
-        assert f"pale: {NOT_APPLICABLE}" in legend(draw(loops.loops, campaign(pale=(1,), run=run)))
+        assert f"pale: {NOT_APPLICABLE}" in legend(draw(loops.loops, campaign(pale=(1,), run=run), "five"))
 
 
 def test_runs_that_failed_at_different_steps_are_in_no_mean():

@@ -23,12 +23,6 @@ def surface():
     return SelfAffineSpectrum(PERIOD, 0.2 * PERIOD, PERIOD / 16, 0.8).realise(64, 1)
 
 
-@pytest.fixture(scope="module")
-def large():
-    """Enough summits that one event is not a per cent of the area."""
-    return SelfAffineSpectrum(PERIOD, 0.2 * PERIOD, PERIOD / 32, 0.8).realise(128, 1)
-
-
 def test_targets_of_every_kind_are_met_exactly_and_in_the_order_of_the_path(surface):
     height = surface.rms_height
     snapshots = [("relative_load", 7e-3), ("mean_separation", 1.7 * height), ("area_fraction", 0.013)]
@@ -85,7 +79,9 @@ def test_a_state_does_not_depend_on_the_kind_of_its_target(surface):
             assert float(other[name][0]) == pytest.approx(float(one[name][0]), rel=1e-7), name
 
 
-def test_steps_of_half_the_length_and_more_targets_change_the_area_by_less_than_a_per_cent(large):
+def test_steps_of_half_the_length_and_more_targets_change_the_area_by_less_than_a_per_cent():
+    # Enough summits that one event is not a per cent of the area.
+    large = SelfAffineSpectrum(PERIOD, 0.2 * PERIOD, PERIOD / 32, 0.8).realise(128, 1)
     few = simulate(large, ADHESIVE, Path([1e-3, 1e-2], max_step=0.1))
     many = simulate(large, ADHESIVE, Path([3e-4, 1e-3, 2e-3, 5e-3, 1e-2], max_step=0.05))
     for name in ("contact_area_fraction", "mean_separation"):

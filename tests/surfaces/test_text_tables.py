@@ -284,7 +284,7 @@ REFUSED = [
     (text(with_coordinates(THIRDS, 1, 1, ""), " "), "24 numbers in line 1 but 25"),
     (IMAGE.format("Topography") + "\n" + IMAGE.format("Phase"), "2 blocks of rows, the second from line 34"),
     (text(rows(write="{:.0f}".format), " ", ZYGO), "Zygo file without points"),
-    # Commas and points between digits, and blanks, of which there may be two kinds.
+    # Commas, points and blanks between digits, which may be decimal or separate thousands or columns.
     *((text(decimal("{:.2f}"), delimiter), "decimal") for delimiter in ", "),
     (text(decimal("{:.1f}")), "decimal"),
     (text(decimal("{:.3f}"), ", "), "decimal"),
@@ -307,8 +307,9 @@ REFUSED = [
 @pytest.mark.parametrize(("content", "words"), REFUSED, ids=lambda each: each if isinstance(each, str) else "")
 def test_texts_that_are_no_heights_or_can_be_read_in_two_ways_are_refused(tmp_path, content, words):
     (tmp_path / "scan.txt").write_bytes(content if isinstance(content, bytes) else content.encode())
-    with refused("path", words):
-        read(tmp_path / "scan.txt", height_unit=None, size=None)
+    for keys in ({}, {"height_unit": None, "size": None}):
+        with refused("path", words):
+            read(tmp_path / "scan.txt", **keys)
 
 
 @pytest.mark.parametrize(

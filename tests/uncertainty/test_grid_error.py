@@ -5,7 +5,7 @@ import math
 import cyclic_campaign as cyclic
 import numpy as np
 import pytest
-from drawn import legend
+from drawn import draw, legend
 
 import icha
 from icha.datasets.campaign_file import campaign_tree
@@ -60,10 +60,9 @@ def test_loops_on_a_coarse_grid_are_named_and_pale():
         not stated["loops"].good and "0.7 cells for soft on rough (pull-off " in text and " % too small, loss " in text
     )
     for module in (loop_figures.loops, against_parameter.pull_off, against_parameter.loss):
-        options = {"studies": ["pull"]} if module is against_parameter.loss else {"study": "pull"}
-        figure = module(coarse, **options)
+        figure = draw(module, coarse, "pull")
         assert f"pale: {COARSE_GRID}" in legend(figure) and "0.7 cells for soft on rough" in caption_of(figure)
-        assert f"pale: {COARSE_GRID}" not in legend(module(fine, **options))
+        assert f"pale: {COARSE_GRID}" not in legend(draw(module, fine, "pull"))
     assert {each.about: each.good for each in statements_on_dataset(fine)}["loops"]
 
 

@@ -3,6 +3,7 @@
 import cyclic_campaign as cyclic
 import numpy as np
 import pytest
+from drawn import draw
 from sampled_cases import COUNT, sampled
 
 from icha.analysis.checks import check_campaign
@@ -127,11 +128,8 @@ def test_a_failed_check_of_the_loss_leaves_pull_off_and_areas():
     assert table.filter(like="hysteresis_loss").isna().all(axis=None) and set(table.status) == {"failed_loss_checks"}
     assert table["pull_off_pressure"].notna().all()
     assert left_out_of_study(tree["pull"].to_dataset()).words == ""
-    for module, chosen, crossed in (
-        (against_parameter.pull_off, {"study": "pull"}, False),
-        (against_parameter.loss, {"studies": ["pull"]}, True),
-    ):
-        labels = [line.get_label() for line in module(tree, **chosen).axes[0].get_lines()]
+    for module, crossed in ((against_parameter.pull_off, False), (against_parameter.loss, True)):
+        labels = [line.get_label() for line in draw(module, tree, "pull").axes[0].get_lines()]
         assert (FEWER_SEEDS in labels) == crossed
 
 
