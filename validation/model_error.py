@@ -33,7 +33,7 @@ def summary(entries: Mapping[str, xr.Dataset]) -> Table:
     """Table of the median and range, over all states of each study, of the mean errors over the seeds."""
 
     def over_all(errors, name):
-        values = 100 * errors[f"{name}_mean"].values
+        values = 100 * errors[name].mean("seed").values
         values = values[np.isfinite(values)]
         low, middle, high = values.min(), np.median(values), values.max()
         return f"{middle:+.1f} ({low:+.1f} to {high:+.1f})"

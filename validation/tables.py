@@ -116,6 +116,6 @@ def pressures(values: np.ndarray) -> list[str]:
 
 
 def copy_figures(page: str, results: Path) -> None:
-    """Copy the figures of a page from the results of their campaign."""
-    for figure in re.findall(r"\]\(images/(.*?\.png)\)", (DOCS / f"{page}.md").read_text(encoding="utf-8")):
+    """Copy the figures of a page, whose names begin with `fig`, from the results of their campaign."""
+    for figure in re.findall(r"\]\(images/(fig.*?\.png)\)", (DOCS / f"{page}.md").read_text(encoding="utf-8")):
         shutil.copyfile(results / "figures" / figure, DOCS / "images" / figure)
