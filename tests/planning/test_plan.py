@@ -1,6 +1,5 @@
 """The plan contains every file with its cost, and names what the machine lacks."""
 
-import numpy as np
 import pytest
 import yaml
 from conftest import REPOSITORY
@@ -34,19 +33,6 @@ CHANGES = {
 }
 # The study of the random surface alone.
 ROUGH = CHANGES | {"confirmed": [], "studies.one.surfaces": ["rough"], "figures": {}}
-
-
-@pytest.fixture
-def read(load, tmp_path):
-    heights = np.random.default_rng(1).normal(size=(40, 40))
-    np.save(tmp_path / "scan.npy", heights)
-    np.save(tmp_path / "map.npy", heights[:30, :30])
-    return lambda changes: load(changes).campaign
-
-
-@pytest.fixture
-def campaign(read):
-    return read(CHANGES)
 
 
 def test_tensile_targets_have_a_cost(read, tmp_path):

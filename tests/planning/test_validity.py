@@ -33,17 +33,6 @@ CHANGES = {
 }
 
 
-@pytest.fixture
-def read(load, tmp_path):
-    np.save(tmp_path / "scan.npy", np.random.default_rng(1).normal(size=(40, 40)))
-    return lambda changes: load(changes).campaign
-
-
-@pytest.fixture
-def campaign(read):
-    return read(CHANGES)
-
-
 def test_curvatures_are_those_of_the_surfaces(campaign):
     surface = small.surface()
     rough, scanned = (RunLabels("outside", "asperities", name, 0, 1.0, "bare") for name in ("rough", "scan"))
