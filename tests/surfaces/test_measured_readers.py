@@ -217,7 +217,7 @@ WITHOUT_A_MAP = [
 ]
 
 
-@pytest.mark.parametrize(("name", "content", "words"), WITHOUT_A_MAP)
+@pytest.mark.parametrize(("name", "content", "words"), WITHOUT_A_MAP, ids=[name for name, *_ in WITHOUT_A_MAP])
 def test_a_file_without_a_map_of_heights_is_refused(tmp_path, name, content, words):
     (tmp_path / name).write_text(content)
     with refused("path", words):

@@ -304,7 +304,7 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("content", "words"), REFUSED, ids=lambda each: each if isinstance(each, str) else "")
+@pytest.mark.parametrize(("content", "words"), REFUSED, ids=[words for _, words in REFUSED])
 def test_texts_that_are_no_heights_or_can_be_read_in_two_ways_are_refused(tmp_path, content, words):
     (tmp_path / "scan.txt").write_bytes(content if isinstance(content, bytes) else content.encode())
     for keys in ({}, {"height_unit": None, "size": None}):
