@@ -40,6 +40,19 @@ _FAR = 30
 # Nor is one whose distance from the median of five neighbours exceeds this multiple of the range of the medians, and of
 # the median distance. At the turning point of a test the distance is about one step, at a jump-in less than the range.
 _SPIKE, _USUAL_SPIKES, _NEIGHBOURS = 1.0, 30, 5
+# Smallest number of points that determine a work of adhesion.
+LEAST_POINTS = 3
+# A table is sorted if one of its columns never decreases, although another one does before the largest force: by more
+# than the first number times its range, at more than the second number times the number of points.
+_DECREASE, _DECREASES = 0.1, 0.1
+# Number of neighbours of a median; least rise of these medians in a second loading, as a share of the range of
+# the forces, and in units of the median distance of the points from them.
+_MEDIAN, _RISE, _CLEAR_RISE = 5, 0.15, 10.0
+# A contact is clearly larger if the difference is more than this share of the range; noise also makes differences.
+_CLEARLY = 0.2
+# In a reversed test, contact radii of loading exceed those of unloading at equal force: in the median by more than this
+# share of the largest radius.
+_REVERSED = 0.05
 # Largest number of points that a message names.
 _NAMED = 5
 
@@ -170,3 +183,77 @@ def _factor(title, name, unit, from_file):
     if problem := problem_with_numbers(title, unit, si_unit) or problem_with_words(title, name):
         raise ValueError(f"column {title!r} {problem}")
     return factor
+
+
+def refuse_wrong_signs(values: Mapping[str, np.ndarray], places: Sequence[str]) -> None:
+    """Raise ValueError if forces are not positive in compression, or indentations not towards the sample.
+
+    Arguments as in `Points`.
+    """
+    force, contact = values["force"], values.get("contact_radius")
+    top, bottom = int(np.argmax(force)), int(np.argmin(force))
+    size = values["indentation"] if contact is None else contact
+    grows = size[bottom] - size[top] > _CLEARLY * np.ptp(size)
+    if not force[top] > 0 or (grows and force[top] < -force[bottom]):
+        raise ValueError(
+            f"{places[bottom]}, the smallest force, looks like the largest load; expected forces that are positive in "
+            "compression. Change the sign of the forces"
+        )
+    if "indentation" in values and values["indentation"][bottom] > values["indentation"][top]:
+        raise ValueError(
+            f"{places[bottom]}, the smallest force, has a larger indentation than {places[top]}, the largest force; "
+            "expected indentations that are positive towards the sample. Change the sign of the indentations"
+        )
+
+
+def refuse_lost_order(values: Mapping[str, np.ndarray], places: Sequence[str]) -> None:
+    """Raise ValueError if points are not those of one loading and one unloading in the order of the test.
+
+    Arguments as in `Points`.
+    """
+    force = values["force"]
+    top = int(np.argmax(force))
+    if column := _sorted_column(values, top):
+        raise ValueError(
+            f"is sorted by {column}, so neighbouring points jump between loading and unloading; expected the points "
+            "in the order of the test. Restore this order; `icha jkr` also takes a column `branch`"
+        )
+    if (again := _second_loading(force)) is not None:
+        raise ValueError(
+            f"{places[again]}: the force rises for the second time; expected one loading and one unloading. Select the "
+            f"points of one cycle, and check the largest force, {places[top]}"
+        )
+    if (contact := values.get("contact_radius")) is not None:
+        order = np.argsort(force[: top + 1])
+        before = np.interp(force[top:], force[order], contact[order], left=np.nan, right=np.nan)
+        growth = (contact[top:] - before)[np.isfinite(before)]
+        if growth.size >= LEAST_POINTS and np.median(growth) < -_REVERSED * contact.max():
+            raise ValueError(
+                "has larger contact radii before the largest force than after it, at equal force; expected the points "
+                "in the order of the test. They are probably in the reverse order"
+            )
+
+
+def _sorted_column(values, top):
+    """Return the column by which a table is sorted, so that the order of the test is lost; None without one."""
+    steps = {name: np.diff(column) for name, column in values.items()}
+    decreases = max(np.sum(each[:top] < -_DECREASE * np.ptp(values[name])) for name, each in steps.items())
+    is_lost = decreases >= max(LEAST_POINTS, _DECREASES * top)
+    return next((name for name, each in steps.items() if is_lost and (each >= 0).all()), None)
+
+
+def _second_loading(force):
+    """Return the first point of a second loading; None without one.
+
+    It has more than half the largest force; or, after this force, medians of neighbours rise by much more than noise to
+    a force in compression.
+    """
+    high, low = force > 0.5 * force.max(), force < 0.25 * force.max()
+    end = np.argmax(high) + np.flatnonzero(low[np.argmax(high) :])
+    again = end[0] + np.flatnonzero(high[end[0] :]) if end.size else end
+    if not again.size:
+        middle, top = median_filter(force, _MEDIAN), int(np.argmax(force))
+        clear = max(_RISE * np.ptp(force), _CLEAR_RISE * float(np.median(np.abs(force - middle))))
+        rise = middle[top:] - np.minimum.accumulate(middle[top:])
+        again = top + np.flatnonzero((rise > clear) & (middle[top:] > clear))
+    return int(again[0]) if again.size else None

@@ -11,14 +11,13 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from scipy.ndimage import median_filter
 
 from icha.asperity.full_contact import HIGH_PULL_OFF_BELOW, full_contact_energy_ratio
 from icha.asperity.material import VAN_DER_WAALS_RANGE, Material
 from icha.asperity.tabor import describe_short_range
 from icha.references.indentation import axisymmetric_contact, sphere_contact, sphere_energy_release_rate
 from icha.references.jkr_loop import Loop, fit_loop
-from icha.references.jkr_tables import Points, read_points
+from icha.references.jkr_tables import LEAST_POINTS, Points, read_points, refuse_lost_order, refuse_wrong_signs
 from icha.support.formatting import choose_unit, format_count
 from icha.support.rules import INDENTATIONS, LENGTH, POSITIVE
 from icha.support.usual import USUAL, IchaWarning, unusual_arguments
@@ -27,8 +26,8 @@ from icha.surfaces.shapes import Sphere
 if TYPE_CHECKING:
     from icha.surfaces.surface import Surface
 
-# Probability that an interval contains the true value; smallest number of points that determine a work of adhesion.
-PROBABILITY, LEAST_POINTS = 0.9, 3
+# Probability that an interval contains the true value.
+PROBABILITY = 0.9
 # Under displacement control, a sphere of JKR jumps off at 5/9 of the pull-off force. Points with less tension, after
 # the point of the largest tension, are without contact.
 _JUMP_OFF_SHARE = 0.5
@@ -40,12 +39,6 @@ _FORCE_ERROR = 0.02
 _LEAST_WORK = 1e-3
 # Largest force over the pull-off force without a warning; docs/estimates.md gives the intervals of larger loads.
 _MOST_FORCE = 12.0
-# A table is sorted if one of its columns never decreases, although another one does before the largest force: by more
-# than the first number times its range, at more than the second number times the number of points.
-_DECREASE, _DECREASES = 0.1, 0.1
-# Number of neighbours of a median; least rise of these medians in a second loading, as a share of the range of
-# the forces, and in units of the median distance of the points from them.
-_MEDIAN, _RISE, _CLEAR_RISE = 5, 0.15, 10.0
 # Neighbouring residuals are not random if their correlation exceeds the first number, and the second number divided by
 # the root of the number of points. Smaller residuals than the third number, in units of the errors, are rounded.
 _CORRELATION, _BY_CHANCE, _ROUNDING = 0.3, 2.5, 1e-4
@@ -205,33 +198,15 @@ def _choose_points(points: Points, radius: float) -> tuple[np.ndarray, np.ndarra
     """Return why each point is left out ("" if it is used), and which points belong to unloading."""
     values, places = points.values, points.places
     force, contact = values["force"], values.get("contact_radius")
-    top, bottom = int(np.argmax(force)), int(np.argmin(force))
-    size = contact if contact is not None else values["indentation"]
-    if not force[top] > 0 or (size[bottom] > size[top] and force[top] < -force[bottom]):
-        raise ValueError(
-            f"{places[bottom]}, the smallest force, looks like the largest load; expected forces that are positive in "
-            "compression. Change the sign of the forces"
-        )
-    if "indentation" in values and values["indentation"][bottom] > values["indentation"][top]:
-        raise ValueError(
-            f"{places[bottom]}, the smallest force, has a larger indentation than {places[top]}, the largest force; "
-            "expected indentations that are positive towards the sample. Change the sign of the indentations"
-        )
+    top = int(np.argmax(force))
+    refuse_wrong_signs(values, places)
     if contact is not None and (large := np.flatnonzero(contact >= radius)).size:
         raise ValueError(
             f"contact radius, {places[large[0]]}: {contact[large[0]]:.4g} m is not less than the radius of the lens, "
             f"{radius:.4g} m. Check the units, and that the column contains radii, not diameters or areas"
         )
-    if points.unloading is None and (column := _sorted_column(values, top)):
-        raise ValueError(
-            f"is sorted by {column}, so neighbouring points jump between loading and unloading; expected the points "
-            "in the order of the test. Restore this order, or add a column `branch`"
-        )
-    if points.unloading is None and (again := _second_loading(force)) is not None:
-        raise ValueError(
-            f"{places[again]}: the force rises for the second time; expected one loading and one unloading. Select the "
-            f"points of one cycle, and check the largest force, {places[top]}"
-        )
+    if points.unloading is None:
+        refuse_lost_order(values, places)
     unloading = np.arange(len(force)) > top if points.unloading is None else points.unloading
     if contact is not None:
         left_out = np.where(contact == 0, "without contact", "").astype(object)
@@ -258,31 +233,6 @@ def _choose_points(points: Points, radius: float) -> tuple[np.ndarray, np.ndarra
     if constant := [quantity for quantity, column in values.items() if not np.ptp(column[kept]) > 0]:
         raise ValueError(f"column of {constant[0]}: all values are the same; expected measured values")
     return left_out, unloading
-
-
-def _sorted_column(values, top):
-    """Return the column by which a table is sorted, so that the order of the test is lost; None without one."""
-    steps = {name: np.diff(column) for name, column in values.items()}
-    decreases = max(np.sum(each[:top] < -_DECREASE * np.ptp(values[name])) for name, each in steps.items())
-    is_lost = decreases >= max(LEAST_POINTS, _DECREASES * top)
-    return next((name for name, each in steps.items() if is_lost and (each >= 0).all()), None)
-
-
-def _second_loading(force):
-    """Return the first point of a second loading; None without one.
-
-    It has more than half the largest force; or, after this force, medians of neighbours rise by much more than noise to
-    a force in compression.
-    """
-    high, low = force > 0.5 * force.max(), force < 0.25 * force.max()
-    end = np.argmax(high) + np.flatnonzero(low[np.argmax(high) :])
-    again = end[0] + np.flatnonzero(high[end[0] :]) if end.size else end
-    if not again.size:
-        middle, top = median_filter(force, _MEDIAN), int(np.argmax(force))
-        clear = max(_RISE * np.ptp(force), _CLEAR_RISE * float(np.median(np.abs(force - middle))))
-        rise = middle[top:] - np.minimum.accumulate(middle[top:])
-        again = top + np.flatnonzero((rise > clear) & (middle[top:] > clear))
-    return int(again[0]) if again.size else None
 
 
 def _without_contact(force, unloading):
@@ -324,7 +274,7 @@ def _warnings(test, errors, interaction_range, thickness, roughness) -> Iterator
             "the contact is stuck at nearly all points of unloading, so there is no receding work of adhesion; it is "
             f"at least about {1e3 * rate:.3g} mJ/m². Measure up to pull-off, or load less"
         )
-    elif test.receding_work.value < advancing:
+    elif test.receding_work.high < test.advancing_work.low:
         yield (
             "the receding work of adhesion is less than the advancing one, which no law of adhesion explains; check "
             "that the points are in the order of the test, not in the reverse order"

@@ -5,6 +5,7 @@ import pytest
 
 from icha.configuration.errors import ConfigurationError
 from icha.support.tables import read_columns
+from validation.jkr_test import exact_test
 
 
 def _measurement(**changes):
@@ -183,6 +184,26 @@ SEVERAL = {"surfaces.other": OTHER, "studies.one.surfaces": ["rough", "other"]}
 def test_measurements_that_cannot_be_drawn(table, entry, changes, message, refused, tmp_path):
     (tmp_path / "points.csv").write_text(table, encoding="utf-8")
     refused("", changes | {"measurements": {"lab": entry}}, message)
+
+
+@pytest.mark.parametrize(
+    ("order", "sign", "message"),
+    [
+        (lambda force: np.argsort(force), 1, "is sorted by force"),
+        (lambda force: np.arange(len(force))[::-1], 1, "probably in the reverse order"),
+        (lambda force: np.tile(np.arange(len(force)), 2), 1, "the force rises for the second time"),
+        (lambda force: np.arange(len(force)), -1, "looks like the largest load"),
+    ],
+)
+def test_points_of_figure_18_are_one_test_in_its_order(order, sign, message, load, tmp_path):
+    test = exact_test()
+    rows = np.stack([sign * test["force"], test["contact_radius"]], axis=1)[order(test["force"])] * 1e3
+    lines = [f"{force!r},{radius!r}" for force, radius in rows.tolist()]
+    (tmp_path / "points.csv").write_text("\n".join(["F,a", *lines]))
+    lens = _lens(force="F", contact_radius="a") | {"material": "soft"}
+    lens["contact_radius"]["unit"] = "mm"
+    with pytest.raises(ConfigurationError, match=message):
+        load(SHAPE | {"measurements": {"lab": lens}})
 
 
 @pytest.mark.parametrize(

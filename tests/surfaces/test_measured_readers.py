@@ -63,6 +63,15 @@ def test_netcdf_says_its_axes_and_units(tmp_path, keys):
     assert_read(scan(write_netcdf(tmp_path / "scan.nc", **keys)))
 
 
+def test_netcdf_whose_numbers_increase_downwards_is_asked_about(tmp_path):
+    path = write_netcdf(tmp_path / "scan.nc")
+    with netCDF4.Dataset(path, "a") as file:
+        file["height"].positive = "down"
+    with refused("touches_first", "positive: down"):
+        scan(path)
+    scan(path, touches_first="low")
+
+
 def test_units_and_missing_points_of_the_file(tmp_path):
     path = write_netcdf(tmp_path / "scan.nc", unit="um")
     assert_read(scan(path), UM)

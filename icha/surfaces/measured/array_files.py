@@ -15,12 +15,14 @@ import numpy as np
 
 from icha.support.input_files import require_room
 from icha.surfaces.measured.settings import (
+    DOWNWARDS,
     LINE_SCAN,
     OFF_GRID,
     FileContent,
     Preparation,
     UnfitTopography,
     metres_of,
+    refuse_downwards,
     unused_factors,
 )
 
@@ -255,8 +257,13 @@ def _unit_of(attributes):
 
 
 def _unused_factors(attributes, settings):
-    """Return the attributes that may be factors of the heights; those of netCDF have been applied."""
+    """Return the attributes that may be factors of the heights; those of netCDF have been applied.
+
+    Raise UnfitTopography if the numbers increase downwards.
+    """
     entries = {name: str(value).strip("[]") for name, value in attributes.items() if name != "scale_factor"}
+    directions = ((name, entries[name]) for name in ("positive", "standard_name", "long_name") if name in entries)
+    refuse_downwards((f"{name}: {value}" for name, value in directions if DOWNWARDS.search(value)), settings)
     return unused_factors(entries.items(), settings)
 
 

@@ -22,6 +22,8 @@ _FACTOR = re.compile(
     r"|lsb|\A1\s|\A(?:(?:conversion|s[ck]al(?:e|ing|ierung)|fa[ck]tor|multiplier|gain)[\s_]*)+\Z",
     re.IGNORECASE,
 )
+# Values of entries on the direction of the heights that mean downwards.
+DOWNWARDS = re.compile(r"down|invert|depth|unten", re.IGNORECASE)
 # Largest distance of a coordinate from its grid line, divided by the distance of the grid lines.
 OFF_GRID = 0.05
 
@@ -128,6 +130,17 @@ def unused_factors(entries: Iterable[tuple[str, ...]], settings: Preparation) ->
             "height_unit",
         )
     return f"not applied: {', '.join(found)}" if found else ""
+
+
+def refuse_downwards(statements: Iterable[str], settings: Preparation) -> None:
+    """Raise UnfitTopography for statements of a file that its numbers increase downwards, unless low points touch."""
+    for statement in statements:
+        if settings.touches_first == "high":
+            raise UnfitTopography(
+                f"is 'high', but the file states {statement.strip()[:60]!r}, so that points with high numbers are "
+                "valleys; expected 'low'. If the numbers increase upwards, remove this statement from the file",
+                "touches_first",
+            )
 
 
 def metres_of(unit: str) -> float | None:

@@ -10,12 +10,14 @@ from icha.support.input_files import require_room
 from icha.support.tables import AMBIGUOUS_COMMA
 from icha.surfaces.measured.array_files import is_instrument_text
 from icha.surfaces.measured.settings import (
+    DOWNWARDS,
     LINE_SCAN,
     FileContent,
     Preparation,
     UnfitTopography,
     grid_indices,
     metres_of,
+    refuse_downwards,
     unused_factors,
 )
 from icha.surfaces.measured.text_tables import Layout, SourceFile, refuse_coordinates, strip_remark
@@ -58,24 +60,27 @@ _NAMES = {
     "unit": "unit|units|einheit",
     "size": "size|scan size|scan range|scan area|field of view",
     "pixel": "pixel|pixel size|pixel spacing|point spacing|spacing|cell size|cellsize|xy calibration|xy justierung",
-    "rows": "nrows|rows|lines|number of rows|number of lines|vertical|vertikal",
-    "columns": "ncols|cols|columns|number of columns|horizontal|horizont",
+    "rows": "nrows|ny|rows|lines|number of rows|number of lines|vertical|vertikal",
+    "columns": "ncols|nx|cols|columns|number of columns|points per line|pixels per line|horizontal|horizont",
     "missing": "nodata value|nodata|no data|undefined value|nan value|fehlwert|ungültiger wert|valeur manquante"
     "|no data value|missing value|missing data value|bad value|bad data|invalid"
     "|invalid value|invalid data|invalid height|void value|null value|fill value|fillvalue",
 }
-# Names of lines about the measurement that contain numbers and change neither size nor heights.
+# Names of lines about the measurement whose numbers change neither size nor heights, and values that do not either.
 _REMARKS = re.compile(
     r"\b(?:date|time|datum|uhrzeit|heure|version|serial|operator|user|file|name|comment|title|id|no|nr|number"
-    r"|temperature|channel|[ip] gain|rate|speed|samples|average)\b"
+    r"|temperature|channel|[ip] gain|rate|speed|samples|average|objective|setpoint|tip|stage)\b"
 )
+_NEUTRAL = re.compile(r"1(?:[.,]0*)?(?:\s*[x×*]\s*1)?|[\d.,]+\s*(?:[kM]?Hz|m?s|m?V|°?C|K|rpm)")
 # Meanings of lines with lengths along the surface, and the largest unit of heights, m.
 _LATERAL, _COARSEST = ("size", "pixel", "width", "height", "dx", "dy", "distance of points"), 1e-3
-# Words about points that were left out or united, about magnified or converted numbers, and factors such as x10.
+# Words about points that were left out or united, such as 2x2, about magnified or converted numbers, and factors such
+# as x10.
 _CHANGES = re.compile(
-    r"binning|decimat|thinn|skip|\bevery (?:other|second|third|\S*\d)|sampling|sub-?sampl|down-?sampl|reduc|stride"
-    r"|\bstep\s*[:=]|\bhal(?:f|ved)\b|doubl|zoom|scal(?:ed?|ing)\b|magnif|factor|multipl|\btimes\b|exag|überhöh"
-    r"|\d[ -]?(?:fold|fach)\b|^[^\d:=]*\s[x×*]\s*\d|normali[sz]|\blog\d*\b(?!\s*[:=])|\bln\b|logarithm",
+    r"binning|decimat|thinned|thinning|skip|\bevery (?:other|second|third|\S*\d)|sampling|sub-?sampl|down-?sampl"
+    r"|reduc|stride|(?<!\d)[2-9]\s?[x×]\s?[2-9](?!\d)|\bstep\s*[:=]|\bhal(?:f|ved)\b|doubl|zoom|scal(?:ed?|ing)\b|magnif"
+    r"|factor|multipli(?:ed|cation)|\btimes\b|exag|überhöh|\d[ -]?(?:fold|fach)\b|^[^\d]*\s[x×*]\s*\d"
+    r"|\bunits? of\s*\d|normali[sz]|\blog\d*\b(?!\s*[:=])|\bln\b|logarithm",
     re.IGNORECASE,
 )
 # Words of lines about the heights alone, and about the points alone.
@@ -88,9 +93,8 @@ _ABOUT = {
 # A number alone, or a number and a unit of length.
 _VALUE = re.compile(rf"{_NUMBER}\s*(\S*)")
 _MEANINGS = {name: meaning for meaning, names in _NAMES.items() for name in names.split("|")}
-# An entry that states in which direction the numbers increase, and values that mean downwards.
+# An entry that states in which direction the numbers increase.
 _DIRECTION = re.compile(r"\bz\b.*(axis|direction|achse)|polarity|positive|height direction")
-_DOWNWARDS = re.compile(r"down|invert|depth|unten", re.IGNORECASE)
 # A line by which the numbers are inverted.
 _INVERTED = re.compile(
     r"\binverted\b(?!\s*[:=]?\s*(?:no|0|off|false|none)\b)|\bdepth\s*[:=]?\s*positive", re.IGNORECASE
@@ -302,13 +306,14 @@ class _Heading:
         for line in () if self.is_known else self.lines:
             name, value = entries.get(line, ("", ""))
             found = _VALUE.match(value)
-            known = name in (*_NAMES, "dx", "dy", "distance of points") or _REMARKS.search(name)
-            is_one = re.fullmatch(r"1(?:[.,]0*)?(?:\s*[x×*]\s*1)?", value)
-            if known or (is_one and "normali" not in name):
+            if name in (*_NAMES, "dx", "dy", "distance of points"):
                 continue
-            about = [each for each, words in _ABOUT.items() if words.search(line)]
+            # One line skipped leaves out every second line.
+            changes = _CHANGES.search(line) and (not _NEUTRAL.fullmatch(value) or re.search("normali|skip", name))
             number = found and (not found[2] or metres_of(found[2]) or found[2][0] in "xX×*")
-            if (number or _CHANGES.search(line)) and (len(about) != 1 or key.replace("lateral_unit", "size") in about):
+            number = number and not (_REMARKS.search(name) or _NEUTRAL.fullmatch(value))
+            about = [each for each, words in _ABOUT.items() if words.search(line)]
+            if (number or changes) and (len(about) != 1 or key.replace("lateral_unit", "size") in about):
                 self._ask(key, stated, line)
 
     def _ask(self, key, stated, line):
@@ -323,6 +328,12 @@ class _Heading:
         """Return whether the heading states the rows and columns of a table; raise an error if it states others."""
         counts, agreed = dict(zip(("rows", "columns"), shape, strict=True)), set()
         for axis, value, line in self.entries:
+            sides = re.fullmatch(r"(\d+)\s*[x×*]\s*(\d+)\s*(?:px|pixels?|points?)?", value)
+            if axis == "size" and sides and sorted(map(int, sides.groups())) != sorted(shape):
+                raise UnfitTopography(
+                    f"has {shape[0]} rows and {shape[1]} columns of numbers, but its heading states "
+                    f"{line.strip()[:40]!r}; expected a whole table. Export it again, or correct or remove this line"
+                )
             if axis in counts and value.isdecimal():
                 if int(value) != counts[axis]:
                     raise UnfitTopography(
@@ -336,14 +347,8 @@ class _Heading:
     def unused_factors(self, settings: Preparation) -> str:
         """Return factors of the heights that are not applied; raise an error if the numbers increase downwards."""
         inverted = [line for line in self.lines if _INVERTED.search(line)]
-        inverted += [line for name, each, line in self.entries if _DIRECTION.search(name) and _DOWNWARDS.search(each)]
-        for line in inverted:
-            if settings.touches_first == "high":
-                raise UnfitTopography(
-                    f"is 'high', but the heading states {line.strip()[:60]!r}, so that points with high numbers are "
-                    "valleys; expected 'low'. If the numbers increase upwards, remove this line from the file",
-                    "touches_first",
-                )
+        inverted += [line for name, each, line in self.entries if _DIRECTION.search(name) and DOWNWARDS.search(each)]
+        refuse_downwards(inverted, settings)
         return unused_factors(self.entries, settings)
 
     def find_height_unit(self, settings: Preparation) -> float | None:
