@@ -16,7 +16,7 @@ from icha.contact.model import GAP_BINS, PRESSURE_BINS
 from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
 from icha.datasets.attributes import DERIVED, combine_attributes, why_no_result
 from icha.datasets.build import bin_values, describe_variables, make_variable
-from icha.datasets.campaign import find_snapshot, loading_stops, run_place, select_run, spots_of
+from icha.datasets.campaign import NoSnapshot, find_snapshot, loading_stops, run_place, select_run, spots_of
 from icha.datasets.labels import LABELS, RunLabels
 from icha.datasets.variables.campaign import COMPLETE, INCOMPLETE, NOT_IN_DESIGN, RAGGED, STATUS
 from icha.datasets.variables.model_error import ASKED, BINS, MODEL_ERROR
@@ -130,11 +130,11 @@ def _stops(run):
     return {float(run["step_target"].values[step]): step for step in np.flatnonzero(targets.values).tolist()}
 
 
-def snapshot_if_any(run: xr.Dataset, kind: str, target: float) -> int | None:
+def snapshot_if_any(run: xr.Dataset, kind: str | None, target: float | None) -> int | None:
     """Return the index of the snapshot of a kind and target in a run; None if the run has no such snapshot."""
     try:
         return find_snapshot(run, kind, target)
-    except ValueError:
+    except NoSnapshot:
         return None
 
 

@@ -21,7 +21,6 @@ from icha.configuration.surfaces import AnySurface, MaterialSection
 from icha.contact.models import MODELS
 from icha.datasets.labels import LABELS, RunLabels, is_derived_study
 from icha.path.targets import AREAS, CONTACT_RADIUS, FORCE, INDENTATION, WITHOUT_ADHESION, Target
-from icha.references.jkr_tables import refuse_lost_order, refuse_wrong_signs
 from icha.support import formatting
 from icha.support.tables import read_columns
 from icha.support.values import Name, Problem, Section, Text, distinct
@@ -250,6 +249,9 @@ class Campaign(Section):
                 columns = read_columns(entry.path, entry.columns, entry.limits(self), entry.signed)
                 values = dict(zip(entry.si_units, columns, strict=True))
                 if entry.force:
+                    # Slow to import.
+                    from icha.references.jkr_tables import refuse_lost_order, refuse_wrong_signs
+
                     refuse_wrong_signs(values, places := [f"row {k}" for k in range(1, 1 + len(columns[0]))])
                 if entry.contact_radius:  # figure 18 shows loading and unloading in two panels
                     refuse_lost_order(values, places)

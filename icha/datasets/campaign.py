@@ -87,9 +87,13 @@ def variables_of_run(tree: xr.DataTree, labels: RunLabels | tuple) -> tuple[dict
     index |= {dim: _ragged_slice(study, dim, place) for dim in RAGGED if dim in study.dims}
     index |= {"step": slice(0, int(steps))}
     ended_early = int(status) in (INCOMPLETE, BEYOND_MODEL)
-    if ended_early:
+    lacks_snapshots = False
+    if "overlap_fraction" in study.variables:
+        # A run without a state of its study has no snapshot of this state.
         overlap = study.variables["overlap_fraction"].transpose(*LABELS, "snapshot")[place].values
-        index["snapshot"] = np.flatnonzero(np.isfinite(overlap))
+        lacks_snapshots = not np.isfinite(overlap).all()
+        if lacks_snapshots:
+            index["snapshot"] = np.flatnonzero(np.isfinite(overlap))
     left_out = {*_OF_EVERY_CAMPAIGN, *_TEXTS, *(f"{dim}_{label}" for dim in RAGGED for label in LABELS)}
     left_out |= {name for model, names in FURTHER.items() if model != labels.model for name in names}
     left_out |= OF_LOSS if int(status) == FAILED_LOSS else set()
@@ -104,7 +108,7 @@ def variables_of_run(tree: xr.DataTree, labels: RunLabels | tuple) -> tuple[dict
         if variable.dtype.kind == "f" and variable.encoding.get("dtype") == np.dtype("int32"):
             # If some runs lack an integer variable, xarray reads the variable as floats.
             variable = xr.Variable(variable.dims, variable.values.astype(np.int32), variable.attrs)
-        if ended_early and name in ("snapshot", "spot_snapshot"):
+        if lacks_snapshots and name in ("snapshot", "spot_snapshot"):
             # Renumber the snapshots of the run, because other runs of the study may have more snapshots.
             numbers = np.searchsorted(index["snapshot"], variable.values)
             variable = xr.Variable(variable.dims, numbers, variable.attrs)
@@ -141,10 +145,14 @@ def loading_stops(data: xr.Dataset) -> xr.DataArray:
     return (data["leg"] == 0) & (data["step_kind"] != BETWEEN)
 
 
+class NoSnapshot(ValueError):
+    """A run does not have a snapshot, for example because it does not reach the state; the message lists others."""
+
+
 def find_snapshot(run: xr.Dataset, kind: str | None = None, target: float | None = None) -> int:
     """Return the index of the first snapshot with a kind and a target; None means any kind or any target.
 
-    Raise ValueError if the run does not have the snapshot.
+    Raise `NoSnapshot` if the run does not have the snapshot.
     """
     snapshots = list(zip(run["snapshot_kind"].values.astype(str), run["snapshot_target"].values, strict=True))
     for k, (found, value) in enumerate(snapshots):
@@ -152,7 +160,7 @@ def find_snapshot(run: xr.Dataset, kind: str | None = None, target: float | None
             return k
     wanted = f"{kind or 'any kind'}{'' if target is None else f' {target:g}'}"
     listed = ", ".join(f"{found} {value:g}" for found, value in snapshots) or "none"
-    raise ValueError(f"no snapshot of {wanted}; the run has: {listed}")
+    raise NoSnapshot(f"no snapshot of {wanted}; the run has: {listed}")
 
 
 def spots_of(run: xr.Dataset, snapshot: int) -> xr.Dataset:

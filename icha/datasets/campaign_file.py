@@ -35,6 +35,7 @@ from icha.datasets.variables.campaign import (
     index_variable,
 )
 from icha.datasets.variables.run import CELLS, CYCLE, FURTHER, INDENTER, LOOP, OF_MODELS, RUN
+from icha.path.targets import UNLOADING
 from icha.support.input_files import text
 
 # Labels of a run, and the dataset of the run or the path of its file.
@@ -217,7 +218,9 @@ class _Study:
             values["status"][self.places[labels]] = MISSING
         for run in self.runs:
             place, status, failure = self.places[run.labels], run.status, run.failure
-            if status in (*WHOLE_RUNS, FAILED_CHECKS) and len(run.snapshots) != len(self.snapshots):
+            # A state that unloading does not reach has no snapshot.
+            lacks = any(not text(kind).startswith(UNLOADING) for kind, _ in self.snapshots.keys() - set(run.snapshots))
+            if status in (*WHOLE_RUNS, FAILED_CHECKS) and lacks:
                 status, failure = INCOMPLETE, f"{len(run.snapshots)} of {len(self.snapshots)} snapshots"
             values["status"][place], values["step_count"][place] = status, run.step_count
             for name, value in zip(texts, (failure, *(run.attrs.get(each, "") for each in texts[1:])), strict=True):
@@ -288,6 +291,8 @@ class _Study:
         missing = f"in runs with the model {' or '.join(lacking)}" if lacking else ""
         if name in INDENTER and not everywhere:
             missing = "in runs whose model, shape or path does not define the value"
+        if "snapshot" in dims and any(len(run.snapshots) < len(self.snapshots) for run in self.runs):
+            missing = "where a run does not reach the state of a snapshot"
         if array.dtype.kind == "S":
             array = np.char.decode(array, "utf-8").astype(object)
         elif example.dtype.kind in "iu":

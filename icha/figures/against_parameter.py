@@ -10,7 +10,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator
 from scipy.stats import linregress
 
-from icha.analysis.model_error import state_of
+from icha.analysis.model_error import snapshot_if_any, state_of
 from icha.asperity.material import WU_HOLDS_FROM
 from icha.asperity.tabor import sphere_pull_off_factor
 from icha.contact.attraction import FINITE_RANGE, SHORT_RANGE
@@ -65,7 +65,10 @@ def tabor(campaign: xr.DataTree, *, study: str, kind: str | None = None, target:
     curves: dict[select.Line, list[select.ContactRuns]] = {}
     bare: dict[select.Line, list[select.ContactRuns]] = {}
     for group in groups:
-        states = {seed: state_of(run, find_snapshot(run, kind, target)) for seed, run in group.by_seed.items()}
+        found = {seed: (run, snapshot_if_any(run, kind, target)) for seed, run in group.by_seed.items()}
+        states = {seed: state_of(run, at) for seed, (run, at) in found.items() if at is not None}
+        if not states:
+            continue
         group = group._replace(by_seed=states)
         of_material = float(group.first["contact_modulus"]), group.surface_energy
         line = group.line._replace(material=materials.setdefault(of_material, group.labels.material))

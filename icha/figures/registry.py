@@ -60,6 +60,7 @@ def draw_figure(
     If no run in the figure is complete, the figure is a message only. `inputs` are paths of files, and `arguments`
     further keyword arguments of the function that draws. `studies` are the studies whose runs the figure shows.
     """
+    from icha.datasets.campaign import NoSnapshot
     from icha.datasets.table import as_csv
     from icha.figures.captions import count_runs, units_of_shapes
     from icha.figures.drawn import caption_of, models_of, say, table_of
@@ -77,7 +78,7 @@ def draw_figure(
         groups = getattr(data.get("campaign"), "children", {})
         say(figure, units_of_shapes(figure, [groups[study].to_dataset() for study in studies if study in groups]))
         caption = caption_in(data["script"]) if "script" in data else caption_of(figure)
-    except NothingToDraw as reason:
+    except (NothingToDraw, NoSnapshot) as reason:
         caption = f"Nothing to draw: {reason}."
         print(caption)
         figure = empty_page(str(reason))

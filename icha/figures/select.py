@@ -9,7 +9,7 @@ import xarray as xr
 from icha.analysis.model_error import snapshot_if_any
 from icha.contact.attraction import FINITE_RANGE
 from icha.contact.models import DEFAULT_MODEL, MODELS, REFERENCE_MODEL, first_model, model_of
-from icha.datasets.campaign import find_snapshot, loading_stops, reduced_gap, run_place, runs_of_status, select_run
+from icha.datasets.campaign import loading_stops, reduced_gap, run_place, runs_of_status, select_run
 from icha.datasets.labels import LABELS, RunLabels, place_of
 from icha.datasets.quantities import quantity
 from icha.datasets.variables.campaign import COMPUTED_RUNS, LOADED_RUNS, MISSING, RAGGED, WHOLE_RUNS
@@ -266,19 +266,27 @@ class Snapshots(NamedTuple):
 def select_snapshots(
     campaign: xr.DataTree, study: str, kind: str | None = None, target: float | None = None
 ) -> list[Snapshots]:
-    """Return the same snapshot of every run on the first surface and slope of a study, for the `shown_model`."""
+    """Return the same snapshot of every run on the first surface and slope of a study, for the `shown_model`.
+
+    Runs that do not reach the state are left out.
+    """
     groups = group_by_contact(campaign, select_runs(campaign, study))
     alone = groups[0].labels.model == REFERENCE_MODEL
     others = [] if alone else select_runs(campaign, study, model=REFERENCE_MODEL)
     found = []
     for group in groups:
         if group.line.place == groups[0].line.place:
-            members = [(run, find_snapshot(run, kind, target)) for run in group.by_seed.values()]
+            members = [(run, snapshot_if_any(run, kind, target)) for run in group.by_seed.values()]
+            members = [member for member in members if member[1] is not None]
+            if not members:
+                continue
             run, at = members[0]
             state = str(run["snapshot_kind"].values[at]), float(run["snapshot_target"].values[at])
             beside = [run for labels, run in others if Line.of(labels).contact == group.line.contact]
             truths = [(truth, snapshot_if_any(truth, *state)) for truth in beside]
             found.append(Snapshots(group, members, [truth for truth in truths if truth[1] is not None]))
+    if not found:
+        raise NothingToDraw(f"study {study}: no run reaches the state of the snapshot")
     return found
 
 

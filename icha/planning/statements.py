@@ -23,7 +23,7 @@ from icha.uncertainty.grid_error import describe_loops, is_resolved
 # over the seeds. Campaign `validation` computes these errors. A test compares them with the page docs/validation.md.
 VALIDATION = {
     True: {"contact area": (-25.3, -8.1), "mean separation": (-36.1, -0.8)},
-    False: {"contact area": (-21.4, -4.9), "mean separation": (-36.4, -0.8)},
+    False: {"contact area": (-21.5, -4.9), "mean separation": (-36.4, -0.8)},
 }
 _VALIDATED = "on seven self-affine surfaces, p* from 0.001 to 0.1 (page on validation)"
 

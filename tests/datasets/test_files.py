@@ -153,6 +153,22 @@ def test_a_run_that_ends_early_keeps_its_spots_where_others_meet_their_snapshots
         np.testing.assert_array_equal(taken[name].values, short[name].values)
 
 
+def test_a_state_that_unloading_does_not_reach_is_no_failure(tmp_path):
+    """Whether unloading reaches a tension depends on the result; leaving out such runs would bias means."""
+    pairs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"]
+    later = str(pairs[0][1]["snapshot_kind"].values[1])
+    for k, (labels, run) in enumerate(pairs):
+        kinds = [f"unloading_{kind}" if kind == later else kind for kind in run["snapshot_kind"].values.tolist()]
+        pairs[k] = labels, run.assign(snapshot_kind=run["snapshot_kind"].copy(data=np.array(kinds, object)))
+    (labels, run), *others = pairs
+    short = run.isel(snapshot=slice(0, 1), spot=np.flatnonzero(run["spot_snapshot"] == 0))
+    write_dataset(campaign_tree([(labels, short), *others]), tmp_path / "c.nc")
+    taken = select_run(read_campaign(tmp_path / "c.nc"), labels)
+    assert "incomplete" not in taken.attrs
+    for name in ("snapshot", "snapshot_kind", "spot_snapshot", "spot_radius", "nominal_pressure"):
+        np.testing.assert_array_equal(taken[name].values, short[name].values)
+
+
 def same(taken, run, labels):
     """That a run taken out of a campaign is what was put into it, and of the same kind."""
     assert set(taken.data_vars) == {*run.data_vars, "model", "surface", "material"}
