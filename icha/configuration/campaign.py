@@ -247,14 +247,15 @@ class Campaign(Section):
         for label, entry in self.measurements.items():
             try:
                 columns = read_columns(entry.path, entry.columns, entry.limits(self), entry.signed)
-                values = dict(zip(entry.si_units, columns, strict=True))
                 if entry.force:
                     # Slow to import.
                     from icha.references.jkr_tables import refuse_lost_order, refuse_wrong_signs
 
-                    refuse_wrong_signs(values, places := [f"row {k}" for k in range(1, 1 + len(columns[0]))])
-                if entry.contact_radius:  # figure 18 shows loading and unloading in two panels
-                    refuse_lost_order(values, places)
+                    values = dict(zip(entry.si_units, columns, strict=True))
+                    places = [f"row {k}" for k in range(1, 1 + len(columns[0]))]
+                    refuse_wrong_signs(values, places)
+                    if entry.contact_radius:  # figure 18 shows loading and unloading in two panels
+                        refuse_lost_order(values, places)
             except ValueError as error:
                 yield ("measurements", label, "path"), entry.path, str(error)
 

@@ -291,8 +291,6 @@ class _Study:
         missing = f"in runs with the model {' or '.join(lacking)}" if lacking else ""
         if name in INDENTER and not everywhere:
             missing = "in runs whose model, shape or path does not define the value"
-        if "snapshot" in dims and any(len(run.snapshots) < len(self.snapshots) for run in self.runs):
-            missing = "where a run does not reach the state of a snapshot"
         if array.dtype.kind == "S":
             array = np.char.decode(array, "utf-8").astype(object)
         elif example.dtype.kind in "iu":

@@ -22,6 +22,7 @@ from icha.datasets.results import COMPRESSION, LEAST_COMPRESSED, LEAST_PLAIN_HEI
 from icha.datasets.variables.campaign import COMPLETE
 from icha.datasets.variables.run import CELLS
 from icha.datasets.variables.terms import is_refused
+from icha.path.targets import UNLOADING
 from icha.support.atomic_files import whole_file
 
 _FLOAT_FILL = 9.969209968386869e36
@@ -37,7 +38,8 @@ def write_dataset(data: xr.Dataset | xr.DataTree, path: str | os.PathLike) -> No
     """Write a dataset or a tree of datasets to the netCDF-4 file `path`.
 
     Missing values are written as `_FillValue`. Values may be missing in runs whose `status` is not complete, after the
-    last step of a run, and in variables with the attribute `missing`. The attribute `infinite` allows infinite values.
+    last step of a run, in states of the last unloading that a run does not reach, and in variables with the attribute
+    `missing`. The attribute `infinite` allows infinite values.
 
     Raises
     ------
@@ -119,7 +121,12 @@ def _refuse_values_not_finite(dataset: xr.Dataset, where: str) -> None:
             bad &= ~np.isnan(variable.values)
         if excused is not None and set(variable.dims) & set(excused.dims):
             # A value for several runs may be missing if all these runs are incomplete or missing.
-            may_lack = excused.all([dim for dim in excused.dims if dim not in variable.dims]).variable
+            shared = [dim for dim in excused.dims if dim not in variable.dims]
+            may_lack = excused.all(shared).variable
+            if "snapshot" in variable.dims:
+                # Runs need not reach the states of the last unloading.
+                optional = dataset["snapshot_kind"].astype(str).str.startswith(UNLOADING)
+                may_lack = may_lack | (dataset["snapshot_step"].isnull() & optional).all(shared).variable
             if "step" in variable.dims:
                 may_lack = may_lack | (dataset["step"] >= dataset["step_count"]).variable
             bad &= ~(may_lack & np.isnan(variable)).transpose(*variable.dims).values

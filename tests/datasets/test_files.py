@@ -163,8 +163,13 @@ def test_a_state_that_unloading_does_not_reach_is_no_failure(tmp_path):
     (labels, run), *others = pairs
     short = run.isel(snapshot=slice(0, 1), spot=np.flatnonzero(run["spot_snapshot"] == 0))
     write_dataset(campaign_tree([(labels, short), *others]), tmp_path / "c.nc")
-    taken = select_run(read_campaign(tmp_path / "c.nc"), labels)
+    tree = read_campaign(tmp_path / "c.nc")
+    taken = select_run(tree, labels)
     assert "incomplete" not in taken.attrs
+    # A hole in a snapshot that a run has is refused as before.
+    tree["slopes"]["overlap_fraction"].values[..., 0] = np.nan
+    with pytest.raises(ValueError, match="'overlap_fraction' holds"):
+        write_dataset(tree, tmp_path / "holed.nc")
     for name in ("snapshot", "snapshot_kind", "spot_snapshot", "spot_radius", "nominal_pressure"):
         np.testing.assert_array_equal(taken[name].values, short[name].values)
 

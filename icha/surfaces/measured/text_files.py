@@ -66,7 +66,8 @@ _NAMES = {
     "|no data value|missing value|missing data value|bad value|bad data|invalid"
     "|invalid value|invalid data|invalid height|void value|null value|fill value|fillvalue",
 }
-# Names of lines about the measurement whose numbers change neither size nor heights, and values that do not either.
+# Names of lines about the measurement whose numbers change neither size nor heights. Values of other lines that change
+# nothing: a factor of 1, frequencies, times, voltages and temperatures.
 _REMARKS = re.compile(
     r"\b(?:date|time|datum|uhrzeit|heure|version|serial|operator|user|file|name|comment|title|id|no|nr|number"
     r"|temperature|channel|[ip] gain|rate|speed|samples|average|objective|setpoint|tip|stage)\b"
