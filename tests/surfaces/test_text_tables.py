@@ -158,6 +158,7 @@ def test_factors_of_heights_in_headings_are_asked_about(tmp_path, entry):
 OF_SIZE = (
     "Line spacing: 1 um|Pixel aspect ratio: 2|Binning: 2x2|Decimation: every 2nd point|every second line is left out"
 )
+OF_SIZE += "|Transposed: yes|Columns along y"
 OF_SIZE += (
     "|Downsampled|Stride: 2 pixels|Skip: one pixel|Skipped lines: 1|Number of skipped points: 3|Decimation rate: 4"
 )
@@ -368,7 +369,7 @@ def test_units_in_titles_may_differ_and_count_for_given_columns(tmp_path):
     path = written(tmp_path, text(lines, ",", ["x [mm],y [um],z [nm]"]))
     assert_heights(read(path, height_unit=None, size=None))
     assert_heights(read(path))
-    path = written(tmp_path, text(lines, ",", ["along [mm],across [um],depth [nm]"]))
+    path = written(tmp_path, text(lines, ",", ["along [mm],across [um],relief [nm]"]))
     assert_heights(read(path, height_unit=None, size=None, columns=(1, 2, 3)))
 
 
@@ -398,7 +399,10 @@ def test_titles_that_are_not_known_are_asked_about(tmp_path, titles):
         read(path, size=None)
 
 
-@pytest.mark.parametrize("line", ["# Z axis: down", "Z-Axis direction = inverted", "polarity: depth positive"])
+@pytest.mark.parametrize(
+    "line",
+    ["# Z axis: down", "Z-Axis direction = inverted", "polarity: depth positive", "Depth unit: nm", "Tiefen in nm"],
+)
 def test_numbers_that_increase_downwards_are_not_read_as_heights(tmp_path, line):
     path = written(tmp_path, text(rows(), heading=[line]))
     with pytest.raises(UnfitTopography, match="valleys") as refusal:
@@ -407,3 +411,10 @@ def test_numbers_that_increase_downwards_are_not_read_as_heights(tmp_path, line)
     turned = read(path, touches_first="low").surface.heights / NM
     np.testing.assert_allclose(np.ptp(turned), np.ptp(HEIGHTS), rtol=1e-9)
     assert np.corrcoef(turned.ravel(), HEIGHTS.ravel())[0, 1] < 0
+
+
+def test_points_with_a_title_of_depths_are_asked_about(tmp_path):
+    for title in ("Depth (nm)", "Tiefe [nm]", "z_depth (nm)"):
+        path = written(tmp_path, text(points(), ",", ["Bit depth: 16", f'"X (um)","Y (um)","{title}"']))
+        with refused("touches_first", re.escape(title)):
+            read(path, size=None, height_unit=None, columns=(1, 2, 3))

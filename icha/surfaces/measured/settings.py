@@ -22,8 +22,10 @@ _FACTOR = re.compile(
     r"|lsb|\A1\s|\A(?:(?:conversion|s[ck]al(?:e|ing|ierung)|fa[ck]tor|multiplier|gain)[\s_]*)+\Z",
     re.IGNORECASE,
 )
+# Words for numbers that increase downwards, except those on images and optics, such as bit depth and depth of focus.
+DEPTHS = r"(?<![^\W_])(?<!bit[ _-])(?:depth|tiefe|profondeur|profundidad|profondità)(?! of)"
 # Values of entries on the direction of the heights that mean downwards.
-DOWNWARDS = re.compile(r"down|invert|depth|unten", re.IGNORECASE)
+DOWNWARDS = re.compile(rf"down|invert|unten|{DEPTHS}", re.IGNORECASE)
 # Largest distance of a coordinate from its grid line, divided by the distance of the grid lines.
 OFF_GRID = 0.05
 

@@ -10,6 +10,7 @@ from icha.support.input_files import require_room
 from icha.support.tables import AMBIGUOUS_COMMA
 from icha.surfaces.measured.array_files import is_instrument_text
 from icha.surfaces.measured.settings import (
+    DEPTHS,
     DOWNWARDS,
     LINE_SCAN,
     FileContent,
@@ -26,7 +27,7 @@ from icha.surfaces.measured.text_tables import Layout, SourceFile, refuse_coordi
 _FEWEST_COLUMNS = 8
 # Title of a column: its name and its unit, in brackets or after a sign.
 _TITLE = re.compile(r"(.*?)\s*(?:[\[(]\s*([^\])]*?)\s*[\])]|[/_]\s*([^\W\d_]+))?")
-_NAMES_OF_Z = ("z", "h", "height")
+_NAMES_OF_Z = re.compile(rf"z|h|height|{DEPTHS}", re.IGNORECASE)
 # Words in the titles of tables that are no topographies, such as measurements of contact.
 _QUANTITIES = re.compile(r"load|force|radius|area|pressure|displacement|indentation|approach|time", re.IGNORECASE)
 # Relative error of numbers with seven digits, or of single precision.
@@ -81,14 +82,15 @@ _CHANGES = re.compile(
     r"binning|decimat|thinned|thinning|skip|\bevery (?:other|second|third|\S*\d)|sampling|sub-?sampl|down-?sampl"
     r"|reduc|stride|(?<!\d)[2-9]\s?[x×]\s?[2-9](?!\d)|\bstep\s*[:=]|\bhal(?:f|ved)\b|doubl|zoom|scal(?:ed?|ing)\b|magnif"
     r"|factor|multipli(?:ed|cation)|\btimes\b|exag|überhöh|\d[ -]?(?:fold|fach)\b|^[^\d]*\s[x×*]\s*\d"
-    r"|\bunits? of\s*\d|normali[sz]|\blog\d*\b(?!\s*[:=])|\bln\b|logarithm",
+    r"|\bunits? of\s*\d|transpos|\balong [xy]\b|normali[sz]|\blog\d*\b(?!\s*[:=])|\bln\b|logarithm",
     re.IGNORECASE,
 )
 # Words of lines about the heights alone, and about the points alone.
 _ABOUT = {
     "height_unit": re.compile(r"(?:^|[^\w])z\b|height|vertical|überhöh", re.IGNORECASE),
     "size": re.compile(
-        r"lateral|\bxy?\b(?!\s*\d)|pixel|\bpx\b|\blines?\b|point|spacing|sampl|binning|decimat", re.IGNORECASE
+        r"transpos|\balong\b|lateral|\bxy?\b(?!\s*\d)|pixel|\bpx\b|\blines?\b|point|spacing|sampl|binning|decimat",
+        re.IGNORECASE,
     ),
 }
 # A number alone, or a number and a unit of length.
@@ -96,10 +98,8 @@ _VALUE = re.compile(rf"{_NUMBER}\s*(\S*)")
 _MEANINGS = {name: meaning for meaning, names in _NAMES.items() for name in names.split("|")}
 # An entry that states in which direction the numbers increase.
 _DIRECTION = re.compile(r"\bz\b.*(axis|direction|achse)|polarity|positive|height direction")
-# A line by which the numbers are inverted.
-_INVERTED = re.compile(
-    r"\binverted\b(?!\s*[:=]?\s*(?:no|0|off|false|none)\b)|\bdepth\s*[:=]?\s*positive", re.IGNORECASE
-)
+# A line by which the numbers are inverted, or are depths.
+_INVERTED = re.compile(rf"\binverted\b(?!\s*[:=]?\s*(?:no|0|off|false|none)\b)|{DEPTHS}", re.IGNORECASE)
 # Number for a missing height in grids by ESRI, if the heading does not define another number.
 _ESRI_MISSING = -9999.0
 
@@ -255,7 +255,7 @@ def _read_titles(titles):
     units = [match[2] or match[3] or "" for match in found if match]
     # A word after a sign is part of the name if it is not a unit, as in z_raw.
     names = [match[1 if match[3] is None or metres_of(match[3]) else 0].lower() for match in found if match]
-    names = ["z" if name in _NAMES_OF_Z else name for name in names]
+    names = ["z" if _NAMES_OF_Z.fullmatch(name) else name for name in names]
     unique = all(names.count(axis) == 1 for axis in "xyz")
     return [names.index(axis) + 1 for axis in "xyz"] if unique else [], units
 
