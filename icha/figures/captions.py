@@ -37,15 +37,16 @@ def attractions_of(runs: Iterable[xr.Dataset]) -> set[str]:
     return {run.attrs.get("attraction", "") for run in runs}
 
 
-def about_boundary_elements(runs: Iterable[xr.Dataset], seeds: Iterable[tuple[int, int]] = ()) -> str:
-    """Return the range of attraction of boundary elements, and on how many topographies they are, if on fewer.
+def about_boundary_elements(runs: Iterable[xr.Dataset], seeds: Iterable[Sequence[int]] = ()) -> str:
+    """Return the range of attraction of boundary elements, and the numbers of seeds of the means if these differ.
 
-    `seeds` has the numbers of seeds of the asperity model and of boundary elements, for each pair of curves.
+    `seeds` has the numbers of seeds of another model and of boundary elements, for each pair of curves.
     """
     words = range_of_attraction(attractions_of(runs))
-    if fewer := sorted({truths for asperities, truths in seeds if truths != asperities}):
-        alone = f"{' or '.join(map(str, fewer))} of the topographies alone"
-        words += f" Boundary elements are on {alone}, so their means also differ by the seeds."
+    if differ := [pair for pair in seeds if pair[0] != pair[1]]:
+        others, truths = (" or ".join(map(str, sorted(set(each)))) for each in zip(*differ, strict=True))
+        words += f" Means of boundary elements are over {truths} of the topographies, "
+        words += f"and those beside them over {others}, so they also differ by the seeds."
     return words
 
 

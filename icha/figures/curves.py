@@ -209,8 +209,8 @@ def draw_curves(
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Draw the curves of a study on double logarithmic axes; return loads and values of all points of loading."""
     drawn = []
-    asperities = {curve.runs.line.contact: len(curve.runs.by_seed) for curve in curves.lines}
-    seeds = [(asperities.get(curve.runs.line.contact, 0), len(curve.runs.by_seed)) for curve in curves.crosses]
+    pairs = [(line.runs, cross.runs) for cross in curves.crosses for line in curves.lines]
+    seeds = [[len(each.by_seed) for each in pair] for pair in pairs if pair[0].line.contact == pair[1].line.contact]
     runs = [run for curve in (*curves.lines, *curves.crosses) for run in curve.runs.by_seed.values()]
     say(
         next(iter(panels)),

@@ -6,11 +6,12 @@ import pytest
 import small_campaign as small
 from drawn import draw, legend, lines_of
 
+from icha.contact.attraction import SHORT_RANGE
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import RunLabels
 from icha.figures import against_load, against_parameter, contact_maps, loops
 from icha.figures.captions import count_runs
-from icha.figures.drawn import Name
+from icha.figures.drawn import Name, caption_of
 from icha.figures.ensembles import draw_members, draw_points
 from icha.figures.looks import FEWER_SEEDS
 from icha.figures.select import NOT_APPLICABLE
@@ -56,6 +57,17 @@ def test_means_over_fewer_seeds_are_crossed_and_runs_not_applicable_are_pale(mod
     assert legend(figure).count(FEWER_SEEDS) == legend(figure).count(f"pale: {NOT_APPLICABLE}") == 1
     if module is against_parameter.loss:
         assert f"pale: {NOT_APPLICABLE}" in legend(draw(loops.loops, campaign(pale=(1,), run=run), "five"))
+
+
+def test_captions_count_the_seeds_of_pale_means_beside_boundary_elements():
+    runs = []
+    for seed in range(1, 4):
+        labels, run = RunLabels("both", "asperities", "rough", seed, 1.0, "soft"), small.run(seed)
+        runs.append((labels, run.assign_attrs({"applicability": REASON} if seed == 3 else {})))
+        model = "boundary_elements"
+        runs.append((labels._replace(model=model), run.assign_attrs(contact_model=model, attraction=SHORT_RANGE)))
+    caption = caption_of(against_load.area_and_gap(campaign_tree(runs), study="both"))
+    assert "Means of boundary elements are over 3 of the topographies, and those beside them over 1 or 2, so" in caption
 
 
 def test_runs_that_failed_at_different_steps_are_in_no_mean():
