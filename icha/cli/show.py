@@ -14,6 +14,7 @@ _UNIT_OF_SHAPES = (
     "with a shape, reduced pressures are in units of E* times `unit_slope`: the rms height of the shape over the side "
     "of the square, not the rms slope of the roughness"
 )
+_REDUCED = ("reduced_pressure", "reduced_separation", "largest_reduced_pressure")
 _ATTRIBUTES = ("summary", "campaign", "study", "contact_model", "boundary", "shape", "source_file", "preparation")
 
 
@@ -49,9 +50,9 @@ def _dataset(data) -> Iterator[str]:
         yield "as stored:"
     # A smooth shape has no roughness, whose height and slope are the reduced units.
     smooth = "unit_height" in data and not data["rms_height"]
-    reduced = ("reduced_pressure", "reduced_separation", "largest_reduced_pressure") if smooth else ()
-    yield from _quantities(data.drop_vars(reduced, errors="ignore"))
-    if "shape" in data and "reduced_pressure" in data and not smooth:
+    shaped = "shape" in data
+    yield from _quantities(data.drop_vars(_REDUCED if smooth else (), errors="ignore"), shaped=shaped)
+    if shaped and "reduced_pressure" in data and not smooth:
         yield _UNIT_OF_SHAPES
     if "pull_off_force_over_jkr" in data:
         from icha.references.indenter_runs import BRANCHES, reason_without_fit
@@ -60,8 +61,11 @@ def _dataset(data) -> Iterator[str]:
         yield from (f"work of adhesion on {branch}: no fit ({reason})" for branch, reason in reasons.items() if reason)
 
 
-def _quantities(data) -> Iterator[str]:
-    """Yield the words for, and the value or range of, the numbers of a dataset and its values along steps."""
+def _quantities(data, *, shaped=False) -> Iterator[str]:
+    """Yield the words for, and the value or range of, the numbers of a dataset and its values along steps.
+
+    With a shape (`shaped`), the units of reduced quantities are not those of the roughness.
+    """
     import numpy as np
 
     from icha.datasets.quantities import quantity
@@ -80,7 +84,10 @@ def _quantities(data) -> Iterator[str]:
         factor, unit = words.in_unit(largest) if prefixed else (1.0, unit.removeprefix("1"))
         ends = dict.fromkeys(f"{value * factor:.4g}" for value in (values.min(), values.max()))
         # The words for quantities without a symbol are for legends of figures.
-        label = f"{words.name} {words.text}" if words.symbol else variable.attrs.get("long_name", words.name)
+        symbol = words.text
+        if shaped and name in _REDUCED:
+            symbol = symbol.replace("h'rms", " unit_slope ").replace("h_rms", "unit_height")
+        label = f"{words.name} {symbol}" if words.symbol else variable.attrs.get("long_name", words.name)
         numbers = f"{' to '.join(ends)} {unit}"
         yield f"{name:<35} {numbers:<27} {label}"
 
@@ -110,8 +117,9 @@ def _campaign(tree) -> Iterator[str]:
             }
         )
         yield f"  models {', '.join(study['model'].values)}"
-        yield from (f"  {line}" for line in _quantities(flat))
-        if "shape" in study and (study["shape"] != "").any():
+        shaped = "shape" in study and bool((study["shape"] != "").any())
+        yield from (f"  {line}" for line in _quantities(flat, shaped=shaped))
+        if shaped:
             yield f"  {_UNIT_OF_SHAPES}"
         if sentence := left_out_of_study(study).sentence:
             yield f"  results are of {sentence}"

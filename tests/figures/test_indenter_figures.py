@@ -146,7 +146,9 @@ def test_states_beyond_jkr_do_not_spoil_the_axes_and_spheres_of_long_range_have_
     shown = CliRunner().invoke(app, ["show", str(tmp_path / "run.nc")]).output
     assert "work of adhesion on approach: no fit (Tabor parameter 0.3 below 3)" in shown
     write_dataset(press(rms=1e-8), tmp_path / "rough.nc")
-    assert "rms height of the shape" in CliRunner().invoke(app, ["show", str(tmp_path / "rough.nc")]).output
+    rough = CliRunner().invoke(app, ["show", str(tmp_path / "rough.nc")]).output
+    assert "rms height of the shape" in rough and "mean separation ū/unit_height" in rough
+    assert "largest reduced pressure F/(E* unit_slope A0)" in rough
     # There are no reduced values of a smooth shape, and values of full contact are those of the roughness.
     assert "reduced_" not in shown and shown.count("of the roughness alone") == 2
     assert loops.loops(tree, study="press").axes[0].get_xlabel().startswith(label_of("mean_separation"))
