@@ -191,10 +191,11 @@ def collect_inputs(configuration: Configuration) -> tuple[str, dict[str, str]]:
     if not named:
         return configuration.text, {}
     content = yaml.safe_load(configuration.text)
-    if any(section == "materials" for section, _ in named):
-        # Defaults may contain the path of a map, which each material gets at its own place.
-        content["materials"] = apply_defaults(content)["materials"]
-        (content.get("defaults") or {}).pop("materials", None)
+    # Defaults may contain the path of a map, which each material gets at its own place. Other defaults stay, because
+    # the list `confirmed` names them there.
+    defaults = (content.get("defaults") or {}).get("materials") or {}
+    maps = {key: defaults.pop(key) for key in list(defaults) if isinstance(defaults[key], Mapping)}
+    content["materials"] = apply_defaults(content | {"defaults": {"materials": maps}})["materials"]
     used = {("surfaces", campaign.origin("surfaces", name)) for name in campaign.used_surfaces}
     files = {}
     for (section, name), path in named.items():

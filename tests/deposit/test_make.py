@@ -224,6 +224,9 @@ def test_files_are_stored_with_the_configuration(tmp_path):
     campaign["studies"]["load"] |= {"surfaces": ["one", "other"], "rms_slopes": [0.5]}
     campaign["defaults"]["materials"] = {"surface_energy": {"file": "map.npy", "unit": "mJ/m^2"}}
     campaign["materials"]["soft"].pop("surface_energy")
+    campaign["materials"]["soft"].pop("contact_modulus")
+    campaign["defaults"]["materials"]["contact_modulus"] = "30 TPa"
+    campaign["confirmed"] = ["defaults.materials.contact_modulus"]
     campaign["studies"]["load"]["models"] = ["boundary_elements"]
     campaign["figures"] = {"spots": {"study": "load", "script": "spots.py"}}
     columns = {"load": {"column": "p", "unit": "1"}, "area": {"column": "a", "unit": "percent"}}
