@@ -61,7 +61,10 @@ class Loop(NamedTuple):
     offset: float
 
     def curves(self, radius: float) -> dict[str, ContactState]:
-        """Return the states of a sphere by branch: from the touch to the turning point, stuck, and to jump-off."""
+        """Return the states of a sphere by branch: from the touch to the turning point, stuck, and to jump-off.
+
+        The stuck branch exists only if the receding work exceeds the advancing one.
+        """
 
         def equilibria(work, factor):
             least = max(np.cbrt(factor * np.pi * work * radius**2 / self.contact_modulus), _SMALLEST * largest)
@@ -73,6 +76,8 @@ class Loop(NamedTuple):
         loading, receding = equilibria(self.advancing_work, 2.0), equilibria(self.receding_work, 1 / 8)
         stuck = np.linspace(np.transpose(loading)[-1], np.transpose(receding)[-1], _STATES, endpoint=False)
         branches = {"loading": np.array(loading), "stuck": stuck.T, "receding": np.array(receding)[:, ::-1]}
+        if self.receding_work <= self.advancing_work:
+            del branches["stuck"]
         return {name: ContactState(a, depth + self.offset, force) for name, (a, depth, force) in branches.items()}
 
 
@@ -120,11 +125,14 @@ def fit_loop(
 
     def project(loop):
         curves, near, branch = loop.curves(radius), np.empty_like(data), np.empty(len(data), object)
-        for members, names in ((~unloading, ["loading"]), (unloading, ["stuck", "receding"])):
+        states = {name: np.stack([getattr(each, q) for q in points], -1) / scales for name, each in curves.items()}
+        states["loading"] = states["loading"][::-1]  # Both curves begin at the turning point.
+        for members, names in ((~unloading, ["loading"]), (unloading, list(states)[1:])):
             if members.any():
-                curve = np.concatenate([np.stack([getattr(curves[b], q) for q in points], axis=-1) for b in names])
-                near[members], side = _nearest(data[members], curve / scales)
+                near[members], side = _nearest(data[members], np.concatenate([states[name] for name in names]))
                 branch[members] = np.repeat(names, _STATES)[side]
+        if unloads:  # The largest force is at the turning point, which no other point bounds if hardly any is stuck.
+            near[top] = states["loading"][0]
         return near, branch
 
     def residuals(unknown):
@@ -153,7 +161,7 @@ def fit_loop(
         if (far := np.flatnonzero((size > _OUTLYING * 1.5 * np.median(size)) & (share > _OUTLYING_SHARE))).size:
             texts = [", ".join(f"{name.replace('_', ' ')} {each[k]:.4g}" for name, each in points.items()) for k in far]
             raise ValueError(far_from_the_rest([(places[k], text) for k, text in zip(far, texts, strict=True)]))
-    freedom = data.size - len(data) - np.count_nonzero(fit.jac.any(axis=0))
+    freedom = data.size - len(data) + unloads - np.count_nonzero(fit.jac.any(axis=0))
     inverse = np.linalg.pinv(fit.jac)
     variance = 2 * fit.cost / freedom * (inverse**2).sum(axis=1)
     # Points may scatter more where they matter, as forces do near pull-off: squared changes without each of the points
@@ -176,12 +184,12 @@ def fit_loop(
 
 
 def _nearest(points, curve):
-    """Return the nearest point of a polygon, whose first and last side have no outer end, and the side, by point."""
+    """Return the nearest point of a polygon, whose last side has no outer end, and the side, by point."""
     node = KDTree(curve).query(points)[1]
     side = np.stack([np.maximum(node - 1, 0), np.minimum(node, len(curve) - 2)])
     along = curve[side + 1] - curve[side]
     share = ((points - curve[side]) * along).sum(-1) / np.maximum((along**2).sum(-1), np.finfo(float).tiny)
-    share = np.clip(share, np.where(side == 0, -np.inf, 0), np.where(side == len(curve) - 2, np.inf, 1))
+    share = np.clip(share, 0, np.where(side == len(curve) - 2, np.inf, 1))
     near = curve[side] + share[..., None] * along
     closer = ((points - near) ** 2).sum(-1).argmin(axis=0), np.arange(len(points))
     return near[closer], side[closer]

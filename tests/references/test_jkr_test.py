@@ -47,6 +47,29 @@ def test_exact_points_return_their_parameters(columns, receding):
         assert np.abs(known.residuals["indentation"]).max() < 1e-9
 
 
+def reversible_test(order, seed, **branch):
+    """Return a test with one work of adhesion, and noise of 0.5 %, from points of 40 loads and 40 loads back."""
+    states, rng = exact_test(receding=TRUTH["advancing_work"], points=80), np.random.default_rng(seed)
+    columns = {name: states[name][order] for name in ("force", "contact_radius")}
+    return {n: each + 0.005 * np.ptp(each) * rng.standard_normal(len(order)) for n, each in columns.items()} | branch
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_turning_point_of_a_reversible_test_lies_at_the_largest_force(seed):
+    test = icha.fit_jkr_test(reversible_test(range(80), seed), RADIUS)
+    assert test.loop.stuck_radius == pytest.approx(exact_test()["contact_radius"].max(), rel=5e-3)
+    assert test.warnings == ()
+
+
+def test_points_that_dwell_at_the_turning_point_have_the_same_intervals_on_both_branches():
+    order, widths = [*range(40), *[39] * 18, *range(40, 80)], []
+    for loading in (40, 58):
+        branch = ["loading"] * loading + ["unloading"] * (98 - loading)
+        low_high = icha.fit_jkr_test(reversible_test(order, 7, branch=branch), RADIUS).advancing_work[1:]
+        widths.append(np.ptp(low_high))
+    assert widths[0] == pytest.approx(widths[1], rel=0.2)
+
+
 def test_stuck_points_lie_on_the_line_of_a_punch():
     test = icha.fit_jkr_test(EXACT, RADIUS)
     stuck = test.used_for == "stuck"
