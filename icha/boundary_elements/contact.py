@@ -56,6 +56,9 @@ _MET, _MOST_TRIALS = 0.5, 60
 # Longest step of a search without a bracket, and smallest difference of two separations, in h_rms. Least load to which
 # errors at zero load are relative, in units of stiffness times h_rms.
 _LONGEST, _SAME_SEPARATION, _ZERO_LOAD = 0.1, 1e-13, 1e-2
+# Stiffness of a contact under a light load: this number times the load divided by h_rms (B. N. J. Persson, Phys. Rev.
+# Lett. 99 (2007) 125502; C. Campana, B. N. J. Persson & M. H. Mueser, J. Phys.: Condens. Matter 23 (2011) 085001).
+_LIGHT = 2.0
 # Largest displacement by residual pressures, in h_rms.
 _GAP_ERROR = 5e-9
 # Distance of untouched surfaces over the range of attraction: a little more, so that rounding leaves no attraction.
@@ -280,8 +283,6 @@ class BoundaryElements(FullContactProblem):
     def displacement(self, state: CellState) -> np.ndarray:
         """Return the displacement of the elastic surface at the grid nodes, (n, n), m, away from the rough surface."""
         displacement = self.space.displacement(self.field(state.cells, state.pressure / self.contact_modulus))
-        if not self.space.free:
-            displacement -= displacement.mean()
         return self.crop(displacement) * self.spacing
 
     def field(self, cells: np.ndarray, values: np.ndarray | float) -> np.ndarray:
@@ -328,26 +329,25 @@ class BoundaryElements(FullContactProblem):
         return False
 
     def _start(self, window, state, separation):
-        """Return positions and fractions on a window, predicted at a separation (m) by the rates of a state.
+        """Return positions and fractions on a window, predicted at a separation (m), and the rate of the positions.
 
         If a long step would open bonds, cells in contact keep their positions.
         """
         space, distance = self.space.part(window.grid), (separation - state.separation) / self.spacing
 
         def displacement(values):
-            displaced = space.displacement(window.of(self.field(state.cells, values)))
-            return displaced if space.free else displaced - displaced.mean()
+            return space.displacement(window.of(self.field(state.cells, values)))
 
         position = displacement(state.pressure / self.contact_modulus) + state.separation / self.spacing
-        change = np.zeros_like(position) if state.rates is None else displacement(state.rates * distance)
-        if np.abs(change).max() > _LARGEST_PREDICTION:
-            change[:] = 0.0
-        change += distance
+        rate = np.ones_like(position) if state.rates is None else 1 + displacement(state.rates)
+        change = rate * distance
+        if np.abs(change - distance).max() > _LARGEST_PREDICTION:
+            change[:] = distance
         fraction = window.of(self.field(state.cells, state.fraction if self.adhesive else 0.0))
         touching = np.pad(fraction > 0, (0, len(position) - len(fraction)))
         if np.max(change, where=touching, initial=0.0) > _KEPT_BONDS * self.attraction.reach:
             change[touching] = 0.0
-        return position + change, fraction
+        return position + change, fraction, rate
 
     def _window(self, state, separation, window=None):
         """Return a window with all cells that touch or attract if a state moves to a separation (m).
@@ -357,7 +357,7 @@ class BoundaryElements(FullContactProblem):
         whole = Window.whole(self.space.grid)
         if not self.space.free:
             return whole
-        position, fraction = self._start(whole, state, separation)
+        position, fraction, _ = self._start(whole, state, separation)
         cells = self.crop(self.attraction.acts_on(position - self.cell_heights, fraction))
         if window is None:
             return Window.around(cells)
@@ -376,9 +376,13 @@ class BoundaryElements(FullContactProblem):
         while window is None or wider.side > window.side:
             window = wider
             problem = solver.Problem(self.space, law, self.cell_heights).part(window)
-            position, fraction = self._start(window, state, separation)
+            position, fraction, rate = self._start(window, state, separation)
             if pressure is not None:
-                control = solver.Control(load=pressure / self.contact_modulus * self.count / position.size)
+                force = pressure / self.contact_modulus * self.count
+                stiffness = 0.0 if state.rates is None else -float(np.sum(state.rates))
+                if stiffness <= 0:
+                    stiffness = _LIGHT * force * self.spacing / self.rms_height
+                control = solver.Control(load=force / position.size, shift=solver.Shift(rate, stiffness))
             else:
                 control = solver.Control(**{"rigid" if self.space.free else "mean": separation / self.spacing})
             tolerance = _GAP_ERROR * self.rms_height / self.spacing
@@ -442,8 +446,6 @@ class BoundaryElements(FullContactProblem):
         by_others = self.space.displacement(
             self.field(state.cells[others], state.pressure[others] / self.contact_modulus)
         )
-        if not self.space.free:
-            by_others -= by_others.mean()
         return self._energy_of_cells(state)[chosen] - 0.5 * pressure * by_others.ravel()[cells] * self.spacing
 
     def _energy_of_cells(self, state):

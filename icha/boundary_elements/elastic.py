@@ -90,8 +90,7 @@ class HalfSpace:
     def displacement(self, pressure: np.ndarray) -> np.ndarray:
         """Return the displacement, (n, n), under a pressure, (m, m), m <= n; the other cells carry no pressure.
 
-        On a periodic surface, the mean pressure counts as a wave of the longest length. (Only the preconditioner of the
-        solver uses this value.)
+        On a periodic surface, the mean displacement is zero.
         """
         return multiply_modes(pressure, self._compliance)
 
@@ -103,9 +102,9 @@ class HalfSpace:
     @cached_property
     def _stiffness(self):
         """Pressure by unit displacement for each mode, (n, n//2 + 1); zero for the mean."""
-        stiffness = 1 / self._compliance
-        stiffness[0, 0] = 0.0
-        return stiffness
+        waves = np.ones(self._compliance.shape, bool)
+        waves[0, 0] = False
+        return np.divide(1, self._compliance, out=np.zeros(waves.shape), where=waves)
 
 
 def multiply_modes(field: np.ndarray, factors: np.ndarray) -> np.ndarray:
@@ -129,7 +128,7 @@ def wave_numbers(grid: int) -> np.ndarray:
 
 @lru_cache(maxsize=2)
 def _compliance(grid, layer, free):
-    """Return the displacement by unit pressure for each mode; see `HalfSpace.displacement` for the mean."""
+    """Return the displacement by unit pressure for each mode; on a periodic surface zero for the mean."""
     if free:
         along = np.abs(scipy.fft.fftfreq(grid)) * grid
         displaced = cell_displacement(along[:, None], along)
@@ -137,5 +136,6 @@ def _compliance(grid, layer, free):
             displaced += layer_correction(np.hypot(along[:, None], along), layer)
         return scipy.fft.rfft2(displaced).real
     q = wave_numbers(grid)
-    q[0, 0] = q[0, 1]
-    return 2 / q if layer is None else layer_compliance(q, layer)
+    waves = q > 0
+    q[waves] = 2 / q[waves] if layer is None else layer_compliance(q[waves], layer)
+    return q

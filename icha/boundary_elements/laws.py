@@ -14,8 +14,8 @@ reach. The sum of the fractions overestimates the contact radius by a constant p
     A = sum f - b sum f (1 - w*f),   b = PERIMETER, w a Gaussian stencil,
 
 subtracts a term in proportion to the perimeter. This term lowers the work W of a cell at convex fronts:
-W = dgamma (1 - b + 2 b w*f). So works and fractions depend on each other, and follow each other in a few rounds. Where
-dgamma is a field, W = (1 - b) dgamma + b (dgamma w*f + w*(dgamma f)).
+W = dgamma (1 - b + 2 b w*f). So works and fractions depend on each other, and follow each other in each step of the
+solver. Where dgamma is a field, W = (1 - b) dgamma + b (dgamma w*f + w*(dgamma f)).
 
 A front may advance at one work of adhesion and recede at a larger one (`DirectedBonds`). Between both it stands.
 
@@ -50,9 +50,8 @@ _MOST_CLOSED = 0.5
 TOUCHING = float(np.finfo(float).smallest_subnormal)
 # Smallest change of a gap, over the range, of which the energy is computed exactly.
 _SMALL_CHANGE = 1e-4
-# Rounds in which fractions of neighbours follow each other: for rates, and for each step. Each leaves about a tenth of
-# the error.
-_ROUNDS, _ROUNDS_OF_STEP = 5, 2
+# Rounds in which fractions of neighbours follow each other, for rates. Each leaves about a seventh of the error.
+_ROUNDS = 5
 _profile = np.exp(-0.5 * (np.arange(-STENCIL_RADIUS, STENCIL_RADIUS + 1) / _WIDTH) ** 2)
 STENCIL = _profile / _profile.sum()
 
@@ -339,8 +338,7 @@ class AtDistance(Bonds):
 
     name = FINITE_RANGE
     cells = slice(None)
-    # Rounds in which works follow the fractions, and whether cells inside a contact are held closed by the law.
-    rounds = 0
+    # Whether cells inside a contact are held closed by the law.
     holds_inside = False
     strength: float
     reach: float
@@ -359,7 +357,10 @@ class AtDistance(Bonds):
         """Return the law of some cells."""
         return self
 
-    def bonds(self, fraction: np.ndarray) -> Bonds:
+    def works(self, fraction: np.ndarray) -> None:
+        """Return None: the law does not depend on the fractions, (n, n)."""
+
+    def bonds(self, fraction: np.ndarray, works: None = None) -> Bonds:
         """Return the law of every cell; it does not depend on the fractions, (n, n)."""
         return self.bonds_of(slice(None))
 
@@ -425,7 +426,7 @@ class Cohesive(AtDistance):
         """Return what receding fronts dissipate between two fields of fractions, (n, n), in E* times cell size^3."""
         return float(np.sum((self.ratio - 1) * self.adhesion_length * np.maximum(before - after, 0.0)))
 
-    def bonds(self, fraction: np.ndarray) -> Bonds:
+    def bonds(self, fraction: np.ndarray, works: None = None) -> Bonds:
         """Return the law of every cell, in the direction of its front."""
         return directed(self.bonds_of(slice(None)), self.ratio, self.before)
 
@@ -474,17 +475,23 @@ class ShortRange:
     ratio: float = 1.0
     before: np.ndarray | None = None
     name = SHORT_RANGE
-    rounds = _ROUNDS_OF_STEP
     holds_inside = True
 
-    def bonds(self, fraction: np.ndarray) -> Bonds:
-        """Return the law of every cell, with the work at the present fractions; only neighbours of contact attract."""
-        cells = np.flatnonzero(with_neighbours(fraction > 0))
-        length = at_cells(self.adhesion_length, cells)
+    def works(self, fraction: np.ndarray) -> np.ndarray:
+        """Return the works of adhesion of all cells, (n, n), at given fractions, (n, n)."""
         # Work and perimeter term follow from one energy, so a cell also has half of the works of its neighbours.
-        own = length * average(fraction).ravel()[cells]
-        by_others = own if np.ndim(length) == 0 else average(self.adhesion_length * fraction).ravel()[cells]
-        work = (1 - PERIMETER) * length + PERIMETER * (own + by_others)
+        length = self.adhesion_length
+        own = length * average(fraction)
+        by_others = own if np.ndim(length) == 0 else average(length * fraction)
+        return (1 - PERIMETER) * length + PERIMETER * (own + by_others)
+
+    def bonds(self, fraction: np.ndarray, works: np.ndarray | None = None) -> Bonds:
+        """Return the law of every cell that attracts: of contact and its neighbours.
+
+        works : (n, n), works of adhesion of the cells; None for those at the fractions.
+        """
+        cells = np.flatnonzero(with_neighbours(fraction > 0))
+        work = (self.works(fraction) if works is None else works).ravel()[cells]
         return directed(LinearBonds(cells, work, np.sqrt(2 * BOND_COMPLIANCE * work)), self.ratio, self.before)
 
     @property

@@ -17,13 +17,14 @@ Lengths are in units of the cell size, pressures in E*.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, minres
 
 from icha.boundary_elements.elastic import HalfSpace
-from icha.boundary_elements.laws import TOUCHING, AtDistance, Bonds, ShortRange, with_neighbours
+from icha.boundary_elements.laws import AtDistance, Bonds, ShortRange, with_neighbours
 from icha.boundary_elements.window import Window
 from icha.contact.model import NotConverged
 
@@ -32,11 +33,17 @@ from icha.contact.model import NotConverged
 _CALM = 1e-3
 # Largest number of iterations. Factor by which a step is shortened that would raise the energy, and most such factors.
 _MOST, _SHORTER, _SHORTENINGS = 3000, 0.3, 30
-# Largest number of refused steps in a row. After each, the works of adhesion come nearer to the fractions.
+# Largest number of refused steps in a row.
 _REFUSALS = 5
-# A length is final if the residual along the direction has become smaller than this part. Largest factor of the second
-# length.
-_STRAIGHT, _FURTHER = 0.2, 10.0
+# Guess of the length of the first step of steepest descent: small, since the start may press single cells. Largest
+# factor between two lengths.
+_FIRST_LENGTH, _FURTHER = 0.01, 10.0
+# A step ends where cells close if the least energy is beyond this part of it. A part of a line is final if the slope is
+# at most this share of that at the start.
+_TO_THE_END, _FINAL_SLOPE = 0.8, 0.05
+# Works of adhesion change by this factor times what the fractions of a step demand. The fractions follow the works in
+# turn, so one round finds a change that is a seventh too small. Least part of the works at the fractions of the step.
+_FOLLOWED, _LEAST_WORK = 1.15, 0.5
 # A step uses the curvature of the energy if this is at least a certain part of the elastic curvature. Close to a jump,
 # the softening of the bonds leaves little curvature.
 _LEAST_CURVATURE = 0.01
@@ -46,13 +53,31 @@ _LOAD_ERROR, _LEAST_LOAD = 1e-7, 1e-4
 _SAME_MEAN = 1e-12
 
 
-@dataclass(frozen=True)
-class Control:
-    """What is given: the mean of the positions, or the rigid approach (free squares), else a load per cell in E*."""
+@dataclass(frozen=True, eq=False)
+class Shift:
+    """Expected change of the positions with the separation: how far the cells move under a missing load.
 
-    load: float = 0.0
+    Parameters
+    ----------
+    position : (n, n), change of the positions when the separation grows by one cell size.
+    stiffness : fall of the force at this change, positive, in E* times cell size^2.
+    """
+
+    position: np.ndarray
+    stiffness: float
+
+
+@dataclass(frozen=True, eq=False)
+class Control:
+    """What is given: the mean of the positions, or the rigid approach (free squares), or a load per cell in E*.
+
+    With a load, a shift is needed. It has no effect on the result, only on the number of iterations.
+    """
+
     mean: float | None = None
     rigid: float | None = None
+    load: float = 0.0
+    shift: Shift | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,11 +153,11 @@ def minimise(
     NotConverged
         After too many iterations, or if no step lowers the energy.
     """
-    space, law = problem.space, problem.law
+    law = problem.law
     # A gap of rounding in a closed cell would count as open, and each step would close it again.
     position = position.copy()
     problem.crop(position)[problem.crop(position) - problem.heights < tolerance] = -np.inf
-    now, last, refused = _start(problem, position, fraction, control), None, 0
+    now, last, length, refused = _start(problem, position, fraction, control), None, _FIRST_LENGTH, 0
     closed, opened, pending = np.zeros(fraction.shape, bool), np.zeros(fraction.shape, bool), 0
     # Cells inside a short-ranged contact of a calm state; cells that close for a moment must be free to open.
     locked = ~with_neighbours(fraction < 1) if law.holds_inside else opened
@@ -151,7 +176,7 @@ def minimise(
             if law.holds_inside:
                 locked = ~with_neighbours(is_open)
             # Each cell closes, and opens, at most once, so that the number of changes is limited.
-            closing = law.within_reach(now.gap, now.field)
+            closing = law.within_reach(now.gap, now.fraction(now.gap))
             opening, pending = inside & (pressure < -law.strength - load), len(closing)
             closing = closing[~closed.ravel()[closing]]
             if len(closing) or opening.any():
@@ -159,20 +184,20 @@ def minimise(
                 now, last = _with_contact(problem, control, now, closing), None
                 continue
         # Direction of steepest descent in the norm of the elastic energy, then conjugate to the last direction.
-        z = space.displacement(r)
+        z = _descent(problem, control, r, held)
         gap_error = _largest(z)
         if gap_error <= tolerance and error <= _CALM and _meets_load(control, pressure + load, r):
             pressure, load = pressure + load, load + float(now.pressure.mean())
-            return Equilibrium(now.position, now.field, pressure, load, held, error, gap_error, pending, iteration)
-        z = _restrict(z, held, control)
+            state = now.position, now.fraction(now.gap), pressure, load, held
+            return Equilibrium(*state, error, gap_error, pending, iteration)
         d = _conjugate(z, r, last, held, control)
         # Step along the direction; a step that would raise the energy is shortened.
-        found = _Line(problem, control, now, r, d).search()
+        found, length = _step(problem, control, now, r, d, length)
         if found is None:
-            refused, last = refused + 1, None
+            refused, last, length = refused + 1, None, _FIRST_LENGTH
             if refused > _REFUSALS:
                 raise NotConverged(f"no step lowers the energy; residual {error:.1e}")
-            now = _Point.of(problem, now.position, now.gap, now.pressure, now.bonds)
+            now = _start(problem, now.position, now.fraction(now.gap), control)
             continue
         now, refused, last = found, 0, (d, r, float(np.vdot(r, z)))
     # The end of the loop.
@@ -185,6 +210,7 @@ class _Point:
 
     position, pressure : (n, n), positions, and pressures without a load that is given, or that keeps a mean position.
     gap : (m, m), gaps.
+    works : (m, m), works of adhesion of the cells; None if they do not depend on the fractions.
     bonds : attraction of the cells.
     force : (n, n), minus pressure and tension: without load, it opens a gap if it is positive.
     """
@@ -192,111 +218,142 @@ class _Point:
     position: np.ndarray
     gap: np.ndarray
     pressure: np.ndarray
+    works: np.ndarray | None
     bonds: Bonds
     force: np.ndarray
 
     @classmethod
-    def of(cls, problem, position, gap, pressure, bonds):
-        """Return the point with these positions; the works of adhesion of given bonds follow their fractions."""
-        for _ in range(problem.law.rounds):
-            bonds = problem.law.bonds(bonds.field(bonds.fraction(bonds.at(gap)), gap.shape))
-        force = -pressure
+    def of(cls, problem, position, gap, pressure, fraction, works):
+        """Return the point with these positions; cells beside contact attract."""
+        bonds, force = problem.law.bonds(fraction, works), -pressure
         problem.crop(force).flat[bonds.cells] -= bonds.tension(bonds.at(gap))
-        return cls(position, gap, pressure, bonds, force)
+        return cls(position, gap, pressure, works, bonds, force)
 
-    @property
-    def field(self):
-        """Fractions of all cells, (m, m)."""
-        return self.bonds.field(self.bonds.fraction(self.bonds.at(self.gap)), self.gap.shape)
+    def fraction(self, gap):
+        """Return the fractions of all cells at some gaps, (m, m)."""
+        return self.bonds.field(self.bonds.fraction(self.bonds.at(gap)), gap.shape)
 
 
 def _start(problem, position, fraction, control):
     """Return the point from which the iteration starts."""
     position = position.copy()
     gap, _ = _project(problem, position, control)
-    return _Point.of(
-        problem, position, gap, problem.space.pressure(position, control.rigid), problem.law.bonds(fraction)
-    )
+    pressure = problem.space.pressure(position, control.rigid)
+    return _Point.of(problem, position, gap, pressure, fraction, problem.law.works(fraction))
 
 
 def _with_contact(problem, control, point, cells):
     """Return a point with contact also in further cells, (k,) int, and with the same mean position if it is given."""
-    if not len(cells):
-        return _Point.of(problem, point.position, point.gap, point.pressure, problem.law.bonds(point.field))
     # Heights minus infinity are outside a shape.
     closing = problem.law.closing(cells) & np.isfinite(problem.heights)
     position = point.position.copy()
     problem.crop(position)[closing] = problem.heights[closing]
-    return _start(problem, position, np.where(closing, 1.0, point.field), control)
+    return _start(problem, position, np.where(closing, 1.0, point.fraction(point.gap)), control)
+
+
+def _step(problem, control, now, r, d, length):
+    """Return a point with less energy than `now`, or None, and the length of the step along a direction.
+
+    r, d : (n, n), residuals of `now`, and direction.
+    length : guess of the length.
+    """
+    for _ in range(_SHORTENINGS):
+        # Cells that would close stop at zero gap. The elastic energy on the line to this end is a parabola.
+        change = length * d
+        position = now.position + change
+        gap, cut = _project(problem, position, control)
+        if cut:
+            change = position - now.position
+        slope = float(np.vdot(r, change))
+        if slope <= 0:
+            length *= _SHORTER
+            continue
+        stiff_change = problem.space.pressure(change, None if control.rigid is None else 0.0)
+        line = _Line(problem, now, change, slope, float(np.vdot(change, stiff_change)), cut)
+        part = line.newton()
+        length *= part
+        if not cut and part > line.longest:
+            continue
+        found = line.search(1.0 if cut and part > _TO_THE_END else part)
+        if found is None:
+            return None, length
+        part, fraction, works = found
+        if part != 1:
+            position = now.position + part * change
+            gap = problem.crop(position) - problem.heights
+        return _Point.of(problem, position, gap, now.pressure + part * stiff_change, fraction, works), length
+    return None, length
 
 
 @dataclass(frozen=True, eq=False)
 class _Line:
-    """Search for the length of a step from a point `now` with residuals r along a direction d, (n, n) each."""
+    """Line from a point to an end, and the energy on it.
+
+    change : (n, n), positions of the end minus those of the point.
+    slope, elastic : fall of the energy at the point, and curvature of the elastic energy, for the whole line.
+    cut : whether cells close at the end.
+    """
 
     problem: Problem
-    control: Control
     now: _Point
-    r: np.ndarray
-    d: np.ndarray
+    change: np.ndarray
+    slope: float
+    elastic: float
+    cut: bool
 
-    def search(self):
-        """Return a point with less energy, or None.
+    @cached_property
+    def longest(self):
+        """Part of the line, 1 or more, at which the first open cell closes."""
+        if self.cut:
+            return 1.0
+        change = self.problem.crop(self.change)
+        return float(np.min(np.divide(self.now.gap, -change, out=np.full(change.shape, np.inf), where=change < 0)))
 
-        The first length is that of Newton with constant works of adhesion; the second one follows from the residuals at
-        the first. If both raise the energy, the length becomes shorter.
+    def newton(self):
+        """Return the part of the line with the least energy at constant works; a small curvature is not used."""
+        bonds = self.now.bonds
+        softening = bonds.softening(bonds.at(self.now.gap)) * bonds.at(self.problem.crop(self.change)) ** 2
+        curvature = self.elastic - float(np.sum(softening))
+        if curvature <= _LEAST_CURVATURE * self.elastic:
+            curvature = self.elastic
+        return self.slope / max(curvature, self.slope / _FURTHER)
+
+    def search(self, part):
+        """Return a part of the line with less energy, and fractions and works there; or None.
+
+        The works follow the fractions of the first part, and change along the line in proportion. The second part
+        follows from the slope at the first. If both raise the energy, the part becomes shorter.
         """
-        rigid = None if self.control.rigid is None else 0.0
-        stiff_d, slope = self.problem.space.pressure(self.d, rigid), float(np.vdot(self.r, self.d))
-        # Without contact there may be no stiffness: at most the largest gap closes.
-        longest = np.inf
-        if self.now.gap.min() > 0:
-            largest_gap = np.max(self.now.gap, where=self.now.gap < np.inf, initial=0.0)
-            longest = float(largest_gap) / max(-float(self.problem.crop(self.d).min()), TOUCHING)
-        curvature = self._curvature(stiff_d)
-        length = slope / curvature if curvature * longest > slope else longest
-        if not length < np.inf:
-            raise NotConverged("the load pulls the surfaces apart")
-        best, most = None, 0.0
+        law, now = self.problem.law, self.now
+        before, change = now.bonds.at(now.gap), now.bonds.at(self.problem.crop(self.change))
+        pull = np.sum(now.bonds.tension(before) * change)
+        best, most, first, works = None, 0.0, part, None
         for trial in range(_SHORTENINGS):
-            point, cut, end_slope, fall = self._try(length, stiff_d)
+            gap = before + part * change
+            fraction = now.bonds.field(now.bonds.fraction(gap), now.gap.shape)
+            if not trial:
+                works = law.works(fraction)
+            here = works
+            if works is not None:
+                here = np.maximum(now.works + _FOLLOWED * part / first * (works - now.works), _LEAST_WORK * works)
+            bonds = law.bonds(fraction, here)
+            end_change = bonds.at(self.problem.crop(self.change))
+            end_pull = np.sum(bonds.tension(bonds.at(now.gap) + part * end_change) * end_change)
+            end_slope = float(self.slope - part * self.elastic + pull - end_pull)
+            fall = 0.5 * part * (self.slope + end_slope)
+            fall -= now.bonds.energy_beyond_mean_tension(before, gap, part * change)
             if fall >= most:
-                best, most = point, fall
+                best, most = (part, fraction, here), fall
             elif best is not None:
                 return best
-            share = end_slope / slope
-            if trial or cut or abs(share) < _STRAIGHT:
+            share = end_slope / self.slope
+            if trial or self.cut or abs(share) < _FINAL_SLOPE:
                 if best is not None:
                     return best
-                length *= _SHORTER
+                part *= _SHORTER
             else:
-                length = min(length / max(1 - share, 1 / _FURTHER), longest)
+                part = min(part / max(1 - share, 1 / _FURTHER), self.longest)
         return None
-
-    def _curvature(self, stiff_d):
-        """Return the curvature of the energy along d with constant works, or that of the elastic energy."""
-        bonds, d, stiffness = self.now.bonds, self.d, np.vdot(self.d, stiff_d)
-        change = bonds.at(self.problem.crop(d))
-        curvature = stiffness - np.sum(bonds.softening(bonds.at(self.now.gap)) * change**2)
-        return float(curvature if curvature > _LEAST_CURVATURE * stiffness else stiffness)
-
-    def _try(self, length, stiff_d):
-        """Return the point at a length, whether cells were cut off at zero gap, the slope, and the fall of the energy.
-
-        The energy falls by the mean residual times the change of position, and by what the mean tension leaves.
-        """
-        now, problem, change = self.now, self.problem, length * self.d
-        position = now.position + change
-        gap, cut = _project(problem, position, self.control)
-        if cut:
-            pressure, change = problem.space.pressure(position, self.control.rigid), position - now.position
-        else:
-            pressure = now.pressure + length * stiff_d
-        point = _Point.of(problem, position, gap, pressure, now.bonds)
-        r = point.force - _load(self.control, point, None)
-        fall = 0.5 * (np.vdot(self.r, change) + np.vdot(r, change))
-        fall -= now.bonds.energy_beyond_mean_tension(*map(now.bonds.at, (now.gap, gap, problem.crop(change))))
-        return point, cut, float(np.vdot(r, self.d)), float(fall)
 
 
 def _largest(field, shift=0.0):
@@ -310,6 +367,24 @@ def _meets_load(control, pressure, r):
         return True
     load = max(abs(control.load) * r.size, _LEAST_LOAD * float(np.abs(pressure).sum()))
     return abs(float(r.sum())) <= _LOAD_ERROR * load
+
+
+def _descent(problem, control, r, held):
+    """Return the direction of steepest descent in the norm of the elastic energy, (n, n), for residuals r, (n, n).
+
+    Under a load, the cells that are not held also follow the shift, by the missing load.
+    """
+    if control.shift is None:
+        return _restrict(problem.space.displacement(r), held, control)
+    free = r.size - np.count_nonzero(held)
+    z = r - r.sum() / free
+    np.copyto(problem.crop(z), 0.0, where=held)
+    z = problem.space.displacement(z)
+    np.copyto(problem.crop(z), 0.0, where=held)
+    z -= z.sum() / free
+    z += control.shift.position * (np.vdot(control.shift.position, r) / control.shift.stiffness)
+    np.copyto(problem.crop(z), 0.0, where=held)
+    return z
 
 
 def _conjugate(z, r, last, held, control):
