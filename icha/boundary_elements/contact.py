@@ -56,9 +56,6 @@ _MET, _MOST_TRIALS = 0.5, 60
 # Longest step of a search without a bracket, and smallest difference of two separations, in h_rms. Least load to which
 # errors at zero load are relative, in units of stiffness times h_rms.
 _LONGEST, _SAME_SEPARATION, _ZERO_LOAD = 0.1, 1e-13, 1e-2
-# Stiffness of a contact under a light load: this number times the load divided by h_rms (B. N. J. Persson, Phys. Rev.
-# Lett. 99 (2007) 125502; C. Campana, B. N. J. Persson & M. H. Mueser, J. Phys.: Condens. Matter 23 (2011) 085001).
-_LIGHT = 2.0
 # Largest displacement by residual pressures, in h_rms.
 _GAP_ERROR = 5e-9
 # Distance of untouched surfaces over the range of attraction: a little more, so that rounding leaves no attraction.
@@ -381,7 +378,7 @@ class BoundaryElements(FullContactProblem):
                 force = pressure / self.contact_modulus * self.count
                 stiffness = 0.0 if state.rates is None else -float(np.sum(state.rates))
                 if stiffness <= 0:
-                    stiffness = _LIGHT * force * self.spacing / self.rms_height
+                    stiffness = force * self.spacing / self.rms_height
                 control = solver.Control(load=force / position.size, shift=solver.Shift(rate, stiffness))
             else:
                 control = solver.Control(**{"rigid" if self.space.free else "mean": separation / self.spacing})

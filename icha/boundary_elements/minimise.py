@@ -35,15 +35,11 @@ _CALM = 1e-3
 _MOST, _SHORTER, _SHORTENINGS = 3000, 0.3, 30
 # Largest number of refused steps in a row.
 _REFUSALS = 5
-# Guess of the length of the first step of steepest descent: small, since the start may press single cells. Largest
-# factor between two lengths.
-_FIRST_LENGTH, _FURTHER = 0.01, 10.0
-# A step ends where cells close if the least energy is beyond this part of it. A part of a line is final if the slope is
-# at most this share of that at the start.
-_TO_THE_END, _FINAL_SLOPE = 0.8, 0.05
+# Largest factor between two lengths. A part of a line is final if the slope is at most this share of that at the start.
+_FURTHER, _FINAL_SLOPE = 10.0, 0.05
 # Works of adhesion change by this factor times what the fractions of a step demand. The fractions follow the works in
-# turn, so one round finds a change that is a seventh too small. Least part of the works at the fractions of the step.
-_FOLLOWED, _LEAST_WORK = 1.15, 0.5
+# turn, so one round finds a change that is a seventh too small.
+_FOLLOWED = 1.15
 # A step uses the curvature of the energy if this is at least a certain part of the elastic curvature. Close to a jump,
 # the softening of the bonds leaves little curvature.
 _LEAST_CURVATURE = 0.01
@@ -157,7 +153,7 @@ def minimise(
     # A gap of rounding in a closed cell would count as open, and each step would close it again.
     position = position.copy()
     problem.crop(position)[problem.crop(position) - problem.heights < tolerance] = -np.inf
-    now, last, length, refused = _start(problem, position, fraction, control), None, _FIRST_LENGTH, 0
+    now, last, length, refused = _start(problem, position, fraction, control), None, 1.0, 0
     closed, opened, pending = np.zeros(fraction.shape, bool), np.zeros(fraction.shape, bool), 0
     # Cells inside a short-ranged contact of a calm state; cells that close for a moment must be free to open.
     locked = ~with_neighbours(fraction < 1) if law.holds_inside else opened
@@ -194,7 +190,7 @@ def minimise(
         # Step along the direction; a step that would raise the energy is shortened.
         found, length = _step(problem, control, now, r, d, length)
         if found is None:
-            refused, last, length = refused + 1, None, _FIRST_LENGTH
+            refused, last, length = refused + 1, None, 1.0
             if refused > _REFUSALS:
                 raise NotConverged(f"no step lowers the energy; residual {error:.1e}")
             now = _start(problem, now.position, now.fraction(now.gap), control)
@@ -274,7 +270,8 @@ def _step(problem, control, now, r, d, length):
         length *= part
         if not cut and part > line.longest:
             continue
-        found = line.search(1.0 if cut and part > _TO_THE_END else part)
+        # The end has less energy than the start if the least energy is in the second half of the line.
+        found = line.search(1.0 if cut and part > 0.5 else part)
         if found is None:
             return None, length
         part, fraction, works = found
@@ -333,9 +330,7 @@ class _Line:
             fraction = now.bonds.field(now.bonds.fraction(gap), now.gap.shape)
             if not trial:
                 works = law.works(fraction)
-            here = works
-            if works is not None:
-                here = np.maximum(now.works + _FOLLOWED * part / first * (works - now.works), _LEAST_WORK * works)
+            here = works if works is None else now.works + _FOLLOWED * part / first * (works - now.works)
             bonds = law.bonds(fraction, here)
             end_change = bonds.at(self.problem.crop(self.change))
             end_pull = np.sum(bonds.tension(bonds.at(now.gap) + part * end_change) * end_change)
