@@ -436,10 +436,10 @@ def rates(problem: Problem, found: Equilibrium, accuracy: float) -> tuple[np.nda
     force = _restrict(-stiffness(start, moved), found.held, control)
     change, _ = minres(of_free_cells(stiffness), force.ravel(), M=of_free_cells(space.displacement), rtol=accuracy)
     change = start + change.reshape(start.shape)
-    pressure = space.pressure(change, moved.rigid)
+    pressure, (fraction, tension) = space.pressure(change, moved.rigid), tangent.changes(problem.crop(change))
     if not space.free:
-        pressure -= stiffness(change)[~found.held].mean()
-    return problem.crop(pressure), tangent.changes(problem.crop(change))[0]
+        pressure -= (pressure + tension)[~found.held].mean()
+    return problem.crop(pressure), fraction
 
 
 def _project(problem, position, control):
