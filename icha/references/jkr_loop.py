@@ -32,6 +32,10 @@ _STATES, _SMALLEST = 400, 1e-3
 _GUESSES = (0.5, 1.0, 2.0), (1.0, 3.0), (0.03, 0.3, 1.0)
 # Number of guesses that are refined; relative decrease and step at which a fit ends, far below the noise of tests.
 _REFINED, _CONVERGENCE = 3, {"ftol": 1e-6, "xtol": 1e-6}
+# Root of a receding work that no contact reaches, in units of the points. Noise alone lets a fit find receding points:
+# they count only if they lower the squared distances by this number of variances, the limit for a change at an unknown
+# point with a probability of one per cent (D. W. K. Andrews, Econometrica 61 (1993) 821, doi:10.2307/2951764).
+_NEVER, _BY_NOISE = 100.0, 13.0
 # Step of numerical derivatives, not much narrower than the distance between states.
 _STEP = 1e-3
 # Largest ratio of the ends of the interval of a modulus; wider ones are far beyond the linear approximation. Largest
@@ -151,6 +155,11 @@ def fit_loop(
     guesses.sort(key=lambda guess: np.sum(residuals(guess) ** 2))
     fits = [least_squares(residuals, guess, derivatives, **_CONVERGENCE) for guess in guesses[:_REFINED]]
     fit = min(fits, key=lambda each: each.cost)
+    if unloads:
+        stuck = least_squares(residuals, np.where(np.arange(5) == 2, _NEVER, fit.x), derivatives, **_CONVERGENCE)
+        fits = [stuck, *fits]
+        if stuck.cost - fit.cost <= _BY_NOISE * fit.cost / (data.size - len(data)):
+            fit = stuck
     usual = 1.5 * float(np.median(np.linalg.norm(fit.fun.reshape(data.shape), axis=1)))
     if np.abs(fit.fun).max() > _DOUBTFUL * usual > 0:
         # Points far from the others have little effect on this fit.

@@ -102,8 +102,9 @@ def read_points(table: Any, columns: Mapping[str, str], units: Mapping[str, str]
     else:
         numbers = [np.asarray(by_title[title]) for title in titles.values()]
         for title, array in zip(titles.values(), numbers, strict=True):
-            if array.shape != (len(places),) or array.dtype.kind not in "fiu" or not np.isfinite(array).all():
-                raise ValueError(f"column {title!r}: expected a list of {len(places)} finite numbers")
+            known = array.size and array.shape == (len(places),) and array.dtype.kind in "fiu"
+            if not known or not np.isfinite(array).all():
+                raise ValueError(f"column {title!r}: expected a list of {len(places) or 'several'} finite numbers")
     for title, array in zip(titles.values(), numbers, strict=True):
         size = np.abs(array)
         largest = int(np.argmax(size))

@@ -158,6 +158,21 @@ def test_a_stuck_contact_gives_a_lower_bound_of_the_receding_work():
     assert test.receding_work is None and test.counts["stuck"] > 10 and 0.04 < bound < 0.09
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_noise_of_stuck_points_is_no_receding_work(seed):
+    """Unloading ends halfway to the force at which the contact would recede."""
+    stuck = EXACT["contact_radius"] == EXACT["contact_radius"].max()
+    top, rng = int(np.argmax(EXACT["force"])), np.random.default_rng(seed)
+    last, size = EXACT["force"][stuck].min(), EXACT["contact_radius"].max()
+    force = np.append(EXACT["force"][: top + 1], np.linspace(EXACT["force"].max(), last, 41)[1:21])
+    radius = np.append(EXACT["contact_radius"][: top + 1], np.full(20, size))
+    noise = 0.01 * rng.standard_normal((2, len(force)))
+    table = {"force": force + noise[0] * np.ptp(force), "contact_radius": radius + noise[1] * size}
+    with pytest.warns(icha.IchaWarning, match="at least about"):
+        test = icha.fit_jkr_test(table, RADIUS)
+    assert test.receding_work is None and test.counts["stuck"] >= 18
+
+
 @pytest.mark.parametrize(
     ("options", "changes", "message"),
     [
@@ -287,6 +302,7 @@ def test_intervals_do_not_depend_on_wrong_ratios_of_errors():
         (EXACT, {"columns": {"force": "load"}}, "has no column 'load'; expected one of force, contact_radius"),
         (EXACT, {"errors": {"force": 1e-5}}, "errors: no value for contact_radius"),
         (EXACT | {"force": ["1"] * 40}, {}, "column 'force': expected a list of 40 finite numbers"),
+        ({"force": [], "contact_radius": []}, {}, "column 'force': expected a list of several finite numbers"),
         ([1.0], {}, "list is not a table"),
     ],
 )
