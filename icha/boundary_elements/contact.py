@@ -378,6 +378,7 @@ class BoundaryElements(FullContactProblem):
                 force = pressure / self.contact_modulus * self.count
                 stiffness = 0.0 if state.rates is None else -float(np.sum(state.rates))
                 if stiffness <= 0:
+                    # About that of a rough surface under a light load.
                     stiffness = force * self.spacing / self.rms_height
                 control = solver.Control(load=force / position.size, shift=solver.Shift(rate, stiffness))
             else:

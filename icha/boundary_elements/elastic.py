@@ -102,9 +102,9 @@ class HalfSpace:
     @cached_property
     def _stiffness(self):
         """Pressure by unit displacement for each mode, (n, n//2 + 1); zero for the mean."""
-        waves = np.ones(self._compliance.shape, bool)
-        waves[0, 0] = False
-        return np.divide(1, self._compliance, out=np.zeros(waves.shape), where=waves)
+        stiffness = np.zeros_like(self._compliance)
+        stiffness.flat[1:] = 1 / self._compliance.flat[1:]
+        return stiffness
 
 
 def multiply_modes(field: np.ndarray, factors: np.ndarray) -> np.ndarray:

@@ -492,6 +492,7 @@ class ShortRange:
         """
         cells = np.flatnonzero(with_neighbours(fraction > 0))
         work = (self.works(fraction) if works is None else works).ravel()[cells]
+        # Works that a step continues along its line may be too small; none is below that of a cell without neighbours.
         work = np.maximum(work, (1 - PERIMETER) * at_cells(self.adhesion_length, cells))
         return directed(LinearBonds(cells, work, np.sqrt(2 * BOND_COMPLIANCE * work)), self.ratio, self.before)
 

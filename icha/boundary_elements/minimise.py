@@ -371,15 +371,10 @@ def _descent(problem, control, r, held):
     """
     if control.shift is None:
         return _restrict(problem.space.displacement(r), held, control)
-    free = r.size - np.count_nonzero(held)
-    z = r - r.sum() / free
-    np.copyto(problem.crop(z), 0.0, where=held)
-    z = problem.space.displacement(z)
-    np.copyto(problem.crop(z), 0.0, where=held)
-    z -= z.sum() / free
+    others = Control(mean=0.0)
+    z = _restrict(problem.space.displacement(_restrict(r.copy(), held, others)), held, others)
     z += control.shift.position * (np.vdot(control.shift.position, r) / control.shift.stiffness)
-    np.copyto(problem.crop(z), 0.0, where=held)
-    return z
+    return _restrict(z, held, control)
 
 
 def _conjugate(z, r, last, held, control):
@@ -402,7 +397,7 @@ def _restrict(change, held, control):
     inside = change[: len(held), : len(held)]
     np.copyto(inside, 0.0, where=held)
     if control.mean is not None:
-        inside -= inside.sum() / max(held.size - np.count_nonzero(held), 1)
+        change -= change.sum() / max(change.size - np.count_nonzero(held), 1)
         np.copyto(inside, 0.0, where=held)
     return change
 

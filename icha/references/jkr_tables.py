@@ -102,8 +102,8 @@ def read_points(table: Any, columns: Mapping[str, str], units: Mapping[str, str]
     else:
         numbers = [np.asarray(by_title[title]) for title in titles.values()]
         for title, array in zip(titles.values(), numbers, strict=True):
-            known = array.size and array.shape == (len(places),) and array.dtype.kind in "fiu"
-            if not known or not np.isfinite(array).all():
+            is_list = array.size and array.shape == (len(places),) and array.dtype.kind in "fiu"
+            if not is_list or not np.isfinite(array).all():
                 raise ValueError(f"column {title!r}: expected a list of {len(places) or 'several'} finite numbers")
     for title, array in zip(titles.values(), numbers, strict=True):
         size = np.abs(array)

@@ -105,7 +105,7 @@ def load_of(load, factor=1.0):
 
 
 def test_the_expected_shift_does_not_change_the_contact():
-    """The stiffness of the shift is up to a hundred times too large or too small."""
+    """The stiffness of the shift is up to fifty times too large or too small."""
     law = exponential_law(material_of(0.05, 0.3))
     found = [solve(law, load_of(0.01, factor)) for factor in (0.02, 1, 50)]
     positions = np.stack([each.position for each in found])
