@@ -33,6 +33,10 @@ class Shifted(Shape):
     shape: Shape
     shift: tuple[float, float]
 
+    def __str__(self) -> str:
+        """Return name, parameters and shift of the shape in SI units."""
+        return f"{self.shape}, shifted by {self.shift[0]:.6g} and {self.shift[1]:.6g} m"
+
     def heights(self, x, y):
         """Return the heights of the shifted shape."""
         return self.shape.heights(x - self.shift[0], y - self.shift[1])

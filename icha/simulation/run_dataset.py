@@ -23,7 +23,6 @@ from icha.references.limits import tabor_parameter_of
 from icha.simulation.record import PULL_OFF, PathRecord
 from icha.surfaces.moments import height_statistics, slope_anisotropy, spectral_moments
 from icha.surfaces.resolution import shortest_wave
-from icha.surfaces.shapes import describe_shape
 from icha.surfaces.surface import Surface, full_contact_pressure
 
 _STICKINESS_PAPER = "L. Pastewka and M. O. Robbins, PNAS 111 (2014) 3298-3303, doi:10.1073/pnas.1320846111 (stickiness)"
@@ -94,7 +93,7 @@ def _indenter_values(surface: Surface, material: Material, steps: Sequence[dict]
     values = stack_rows({name: INDENTER[name] for name in names}, steps, "step") if steps else {}
     values["layer_thickness"] = material.thickness
     if surface.shape is not None:
-        values["shape"] = describe_shape(surface.shape)
+        values["shape"] = str(surface.shape)
     radius = sphere_radius(surface)
     return values if radius is None else values | {"shape_radius": radius}
 

@@ -34,6 +34,15 @@ class Shape(ABC):
         for name, rule in self.rules.items():
             object.__setattr__(self, name, rule.validate(name, getattr(self, name)))
 
+    def __str__(self) -> str:
+        """Return name and parameters in SI units, such as "sphere of radius 0.001 m"."""
+        names = {kind: name.replace("_", " ") for name, kind in SHAPES.items()}
+        words = []
+        for name, values in vars(self).items():
+            numbers = " and ".join(f"{value:.6g}" for value in np.atleast_1d(values))
+            words.append(f"{name.replace('_', ' ')} {numbers} {'rad' if name == 'half_angle' else 'm'}")
+        return f"{names[type(self)]} of {', '.join(words)}"
+
     @abstractmethod
     def heights(self, x, y) -> np.ndarray:
         """Return the heights at distances x, y from the apex (arrays that broadcast, m); -inf where no body is."""
@@ -191,16 +200,6 @@ class Wave(Shape):
     def shortest_wave(self):
         """Wavelength of the waves, m; infinite without amplitude."""
         return self.wavelength if self.amplitude else math.inf
-
-
-def describe_shape(shape: Shape) -> str:
-    """Return name and parameters of a shape in SI units, such as "sphere of radius 0.001 m"."""
-    names = {kind: name.replace("_", " ") for name, kind in SHAPES.items()}
-    words = []
-    for name, values in vars(shape).items():
-        numbers = " and ".join(f"{value:.6g}" for value in np.atleast_1d(values))
-        words.append(f"{name.replace('_', ' ')} {numbers} {'rad' if name == 'half_angle' else 'm'}")
-    return f"{names.get(type(shape), type(shape).__name__)} of {', '.join(words)}"
 
 
 # Shapes by the names of the configuration.

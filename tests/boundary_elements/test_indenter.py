@@ -90,6 +90,14 @@ def test_sphere_on_a_layer_has_the_limits_of_thick_and_thin():
         assert abs(row["force_error"]) < 0.02, row
 
 
+@pytest.mark.slow
+def test_pull_off_of_a_rough_sphere_does_not_depend_on_the_grid():
+    coarse, fine = (rough_indenters.rough_loop(grid, (4.0, 2.0)) for grid in (64, 128))
+    assert coarse["pull_off"] == pytest.approx(fine["pull_off"], rel=0.02)
+    assert coarse["loss"] > 0
+    assert not coarse["failed_checks"]
+
+
 def test_jumps_of_a_lone_patch_release_the_change_of_the_stored_energy():
     """Bonds at the front store energy too; on a layer they store most of the energy of the last patch."""
     surface = Surface(np.zeros((48, 48)), period=0.8, boundary="free", shape=Sphere(1.0))
