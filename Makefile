@@ -35,7 +35,7 @@ help:
 	@echo "make linkcheck      check the links of the documentation to other websites"
 	@echo "make benchmarks     measure ICHA and other codes (four hours; OPTIONS='--only icha'); see docs/benchmarks.md"
 	@echo "make short-range    compare boundary elements with closed forms (ten minutes); see docs/short_range.md"
-	@echo "make indenter       compare indenters with closed forms and ContactMechanics (half an hour); see docs/indenter.md"
+	@echo "make indenter       compare indenters with closed forms and ContactMechanics (five minutes); see docs/indenter.md"
 	@echo "make jkr-test       count how often intervals of JKR tests contain the truth (ten minutes); see docs/estimates.md"
 	@echo "make applicability  compare asperities with boundary elements on sixty surfaces (ten minutes); see docs/limits.md"
 	@echo "make slurm-environment  install Snakemake and its Slurm executor in .venv-slurm; see docs/howto/cluster.md"

@@ -5,11 +5,13 @@ from __future__ import annotations
 import argparse
 import json
 import time
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
+from icha import IchaWarning
 from validation.tables import Table, write_tables
 
 RESULTS = Path(__file__).resolve().parent / "results"
@@ -29,6 +31,8 @@ def measure_page(page: str, parts: Parts, tables: Callable[[Rows], dict[str, Tab
     parser.add_argument("--parts", nargs="+", choices=parts, default=parts, metavar="PART", help=", ".join(parts))
     parser.add_argument("--tables", action="store_true", help="write the tables from saved measurements")
     options = parser.parse_args()
+    # Studies have units of their own, so that lengths may be unusual for SI units.
+    warnings.simplefilter("ignore", IchaWarning)
     for part in () if options.tables else options.parts:
         print(f"{part} ...", end=" ", flush=True)
         clock = time.perf_counter()
