@@ -27,13 +27,12 @@ def test_nine_of_ten_measured_times_are_within_a_factor_of_two():
             if "summits" in quantities:
                 quantities["spots"] = costs.spots(quantities.pop("summits"), quantities["load"])
             model, *words = kind.split(", ")
-            quantities.pop("load")
             expected = costs.run_seconds(model, adhesive="adhesion" in words, loop="cycle" in words, **quantities)
             # `others` are cases that no law was fitted to; the `large` ones are those of docs/benchmarks.md.
             ratios.setdefault(row["group"], []).append(expected / measured)
             ratios.setdefault("all", []).append(expected / measured)
     assert len(ratios["all"]) > 190
-    for group, least in {"all": 0.95, "fitted": 0.95, "others": 0.9, "large": 0.85}.items():
+    for group, least in {"all": 0.95, "fitted": 0.95, "others": 0.9, "large": 0.85, "few spots": 0.85}.items():
         within = np.mean([0.5 <= ratio <= 2 for ratio in ratios[group]])
         assert within >= least, group
 
