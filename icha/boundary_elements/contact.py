@@ -97,6 +97,11 @@ class BoundaryElements(FullContactProblem):
         return not self.adhesive
 
     @property
+    def spots_jump(self) -> bool:
+        """Whether a patch forms and breaks in a jump: only at a short range of attraction."""
+        return self.divides_cells
+
+    @property
     def area_step(self) -> float:
         """Area of a cell if whole cells touch; 0 at a short range of attraction, because fronts divide cells."""
         return 0.0 if self.divides_cells else 1 / self.count

@@ -109,8 +109,10 @@ class ContactModel(Protocol):
 
     Attributes
     ----------
-    adhesive : whether there is adhesion, so that contact forms and breaks in jumps.
+    adhesive : whether there is adhesion.
     is_unique : whether each load has only one equilibrium, which does not depend on the path.
+    spots_jump : whether a spot forms and breaks in a jump in which it loses energy; not at a finite range of
+        attraction, where contact forms and breaks gradually.
     contact_modulus : E*, the unit of relative loads, Pa.
     pressure_unit : E* h'_rms, the unit of reduced pressures, Pa.
     rms_height : unit of separations, m: rms height of the surface, with a shape `Surface.unit_height`.
@@ -124,6 +126,7 @@ class ContactModel(Protocol):
 
     adhesive: bool
     is_unique: bool
+    spots_jump: bool
     contact_modulus: float
     pressure_unit: float
     rms_height: float

@@ -39,6 +39,7 @@ class InteractingAsperities(AsperityContact):
     largest_area_fraction = 1.5 * 0.25
     area_step = 0.0
     is_unique = False
+    spots_jump = True
     path_accuracy = MODELS[DEFAULT_MODEL].accuracy
 
     def untouched(self) -> ContactState:

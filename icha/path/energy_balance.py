@@ -151,15 +151,17 @@ class EnergyBalance:
         1. Jumps cause the whole loss if the step has no coalescence and no split, if the reference losses of the jumps
            into and out of contact have the same sign, and if the loss is within a factor of two of their sum or more
            than a tenth of the work. The jumps share the loss in proportion to their reference losses.
-        2. In all other cases, each jump causes its reference loss. The rest of the loss is attributed to
-           coalescence if the step has a coalescence or split; otherwise it is unattributed.
+        2. In all other cases, each jump causes its reference loss, or none if spots do not jump. The rest of the loss
+           is attributed to coalescence if the step has a coalescence or split; otherwise it is unattributed.
         """
         energy, kinds, united = step.events.energy, step.events.kind, step.unites_or_splits
         jump_in, jump_off = (float(energy[kinds == kind].sum()) / contact.area for kind in (JUMP_IN, JUMP_OFF))
         ratio = step.loss / ((jump_in + jump_off) or np.inf)
-        certain = 0.5 < ratio < 2 or abs(step.loss) > _CERTAIN_LOSS * abs(step.work)
+        certain = (contact.spots_jump and 0.5 < ratio < 2) or abs(step.loss) > _CERTAIN_LOSS * abs(step.work)
         if certain and ratio and not united and jump_in * jump_off >= 0:
             jump_in, jump_off = ratio * jump_in, ratio * jump_off
+        elif not contact.spots_jump:
+            jump_in = jump_off = 0.0
         rest = step.loss - jump_in - jump_off
         return replace(
             self,

@@ -33,8 +33,8 @@ class PowerLaw:
     Attributes
     ----------
     scale : time if all quantities are 1, s.
-    powers : power of each quantity. Quantities are `nodes` of the grid, `spots` at the largest load, `load`, the largest
-        reduced pressure, and `stops`, the number of targets.
+    powers : power of each quantity. Quantities are `nodes` of the grid, `spots` at the largest load, `stops`, the
+        number of targets, and `load`, the largest reduced pressure.
     """
 
     scale: float
