@@ -1,4 +1,4 @@
-"""Energy of full contact and pressure of complete contact. The energy shows whether a surface is sticky.
+"""Energy of full contact, divided by the work of adhesion: it shows whether a surface is sticky.
 
 In full contact the pressure p(q) = q E* h(q)/2 flattens the wave h(q) of wave number q. Source: B. N. J. Persson and
 E. Tosatti, J. Chem. Phys. 115 (2001) 5597-5610, doi:10.1063/1.1398300.
@@ -18,20 +18,10 @@ MEANING = (
 def full_contact_energy_ratio(full_contact_energy: float, contact_modulus: float, surface_energy: float) -> float:
     """Return U_full/dgamma: elastic energy of full contact, divided by work of adhesion; infinite without adhesion.
 
-    full_contact_energy : U_full/E* of the surface (`icha.surfaces.surface.Surface.full_contact_energy`), m.
+    full_contact_energy : U_full/E* of the surface on the elastic body (`icha.surfaces.moments.FullContact`), m.
     contact_modulus, surface_energy : E* (Pa) and dgamma (J/m^2).
     """
     return full_contact_energy * contact_modulus / surface_energy if surface_energy > 0 else math.inf
-
-
-def gaussian_complete_pressure(waves: float) -> float:
-    """Estimate the pressure, in E* h'_rms, at which contact with a Gaussian surface without adhesion is complete.
-
-    The estimated pressure compensates the largest tension of full contact at zero load. This tension is the largest of
-    about 2 pi waves^2 independent values with the standard deviation E* h'_rms/2. `waves` is the side of the surface,
-    divided by the shortest wavelength. For five spectra, the mean of five surfaces was within 9 % of this estimate.
-    """
-    return math.sqrt(2 * math.log(2 * math.pi * waves**2)) / 2
 
 
 def expected_behaviour(energy_ratio: float, receding_ratio: float) -> str:

@@ -24,6 +24,7 @@ from icha.path.targets import AREAS, CONTACT_RADIUS, FORCE, INDENTATION, WITHOUT
 from icha.support import formatting
 from icha.support.tables import read_columns
 from icha.support.values import Name, Problem, Section, Text, distinct
+from icha.surfaces.moments import FullContact
 from icha.surfaces.resolution import Resolution
 
 # Largest number of entries in a section. The number is small, because the check of an entry goes through all runs of
@@ -41,8 +42,7 @@ class Topography(NamedTuple):
     rms_slope : measured rms slope; None if no study uses the measured slope.
     rms_height : rms height at rms slope 1, m.
     sha256 : SHA-256 of the file.
-    full_contact_energy : elastic energy of full contact per area, divided by E*, at rms slope 1, m.
-    complete_contact_pressure : pressure of complete contact without adhesion, divided by E*, at rms slope 1.
+    full_contact : full contact with a half-space at rms slope 1.
     rms_curvature : rms curvature of profiles at rms slope 1, 1/m.
     shortest_wave : shortest wavelength of the surface, m, and whether it is an estimate.
     repeated_height : description of a height that many points of a scan share; "" without.
@@ -52,8 +52,7 @@ class Topography(NamedTuple):
     period: float
     rms_slope: float | None
     sha256: str
-    full_contact_energy: float
-    complete_contact_pressure: float
+    full_contact: FullContact
     rms_height: float
     rms_curvature: float
     shortest_wave: tuple[float, bool]

@@ -6,15 +6,15 @@ from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
-from icha.asperity.full_contact import gaussian_complete_pressure
 from icha.support.formatting import format_quantity
 from icha.support.titles import contradicting_unit, problem_with_numbers, problem_with_words
 from icha.support.units import find_factor
 from icha.support.values import NOTHING, File, Name, Positive, Problem, Section, Text, unknown
+from icha.surfaces.moments import largest_gaussian_value
 
 # Reduced pressure at which contact without adhesion is complete, for a side of 10^6 shortest wavelengths. Surfaces with
 # fewer wavelengths are in full contact at smaller pressures.
-_FULL_CONTACT = gaussian_complete_pressure(1e6)
+_FULL_CONTACT = largest_gaussian_value(1e6) / 2
 # Quantities of indenters, with their SI units, and those that may be negative.
 _UNITS = {"force": "N", "indentation": "m", "contact_radius": "m", "rms_height": "m"}
 _UNITS |= {"advancing_work": "J/m^2", "receding_work": "J/m^2"}
@@ -145,7 +145,10 @@ class Measurement(Section):
             return {}
         modulus = campaign.materials[self.material].contact_modulus if self.load_is_pressure else None
         slope = self.rms_slope or math.nan  # without a limit if the slope is missing, which `problems` reports
-        if self._beside_shape(campaign):
+        study = campaign.studies[self.study]
+        # Pressures of complete contact with layers have no such limit.
+        layers = any(campaign.materials[name].thickness for name in study.materials)
+        if layers or self._beside_shape(campaign):
             most, reason = modulus or 1 / slope, "F/(E* A0) = 1, too large for linear elasticity"
         else:
             most = _FULL_CONTACT * (modulus * slope if modulus else 1.0)

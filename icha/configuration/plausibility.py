@@ -16,12 +16,13 @@ from icha.configuration.surfaces import SelfAffineSurface
 from icha.contact.attraction import FINITE_RANGE, attraction_on, resolving_spacing
 from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets.labels import RunLabels, coarse_study
+from icha.half_space.layer import softness_of
 from icha.path.targets import FORCE, NOMINAL_PRESSURE, QUANTITIES, UNITS
 from icha.support import formatting
 from icha.support.usual import RMS_SLOPE, SIDE, USUAL, Usual
 from icha.support.values import Problem, to_number, to_si
 from icha.surfaces.measured.settings import MIRROR
-from icha.surfaces.moments import self_affine_full_contact_energy, self_affine_moments
+from icha.surfaces.moments import FullContact, self_affine_full_contact, self_affine_moments
 from icha.surfaces.resolution import LEAST_CELLS, RECOMMENDED_CELLS, Resolution
 
 CONFIRMED = "confirmed"
@@ -280,19 +281,29 @@ _RATIO = Usual(FULL_CONTACT_BELOW, math.inf, f"{_TOO_STICKY}`models: [boundary_e
 _RATIO_OF_LEVELS = _RATIO._replace(text=f"{_TOO_STICKY}`levels` without `asperities`)")
 
 
-def energy_ratio(campaign: Campaign, contact) -> float:
+def full_contact(campaign: Campaign, contact: RunLabels) -> FullContact:
+    """Return the full contact of the roughness of a contact with its half-space or layer, at its rms slope."""
+    section, material = campaign.surfaces[contact.surface], campaign.materials[contact.material].material
+    if isinstance(section, SelfAffineSurface):
+        found = self_affine_full_contact(*section.lengths_and_hurst, softness_of(material))
+    elif material.layered:
+        from icha.configuration.topographies import full_contact_on_layer
+
+        found = full_contact_on_layer(section, material)
+    else:
+        found = campaign.topographies[contact.surface].full_contact
+    return found.scaled(contact.rms_slope)
+
+
+def energy_ratio(campaign: Campaign, contact: RunLabels) -> float:
     """Return U_full/dgamma of a contact: elastic energy of full contact per area, divided by the work of adhesion.
 
     The energy is that of the roughness. Without roughness, the ratio does not matter, and infinity is returned.
     """
-    surface, material = campaign.surfaces[contact.surface], campaign.materials[contact.material]
-    if surface.smooth:
+    material = campaign.materials[contact.material]
+    if campaign.surfaces[contact.surface].smooth:
         return math.inf
-    if isinstance(surface, SelfAffineSurface):
-        energy = self_affine_full_contact_energy(*surface.lengths_and_hurst)
-    else:
-        energy = campaign.topographies[contact.surface].full_contact_energy
-    energy *= contact.rms_slope**2
+    energy = full_contact(campaign, contact).energy
     return full_contact_energy_ratio(energy, material.contact_modulus, material.surface_energy)
 
 

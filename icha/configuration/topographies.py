@@ -16,12 +16,15 @@ from icha.configuration.errors import problem_of, refuse
 from icha.configuration.studies import MEASURED
 from icha.configuration.surfaces import FileSurface, MeasuredSurface, SpectrumSurface
 from icha.configuration.yaml_files import Source
+from icha.half_space.layer import softness_of
 from icha.support.checksums import sha256_of
 from icha.support.usual import IchaWarning
 from icha.support.values import NOTHING, Problem
 from icha.surfaces.measured.settings import UnfitTopography
+from icha.surfaces.moments import FullContact
 
 if TYPE_CHECKING:
+    from icha.asperity.material import Material
     from icha.surfaces.measured.topography import PreparedTopography
     from icha.surfaces.surface import Surface
     from icha.surfaces.tabulated_spectrum import TabulatedSpectrum
@@ -46,18 +49,25 @@ def inspect_topographies(campaign: Campaign) -> tuple[dict[str, Topography], lis
     return facts, problems
 
 
-# Properties of the topographies that have been read, by path, settings, time and size of the file.
+# Properties of the topographies that have been read, and their full contact with layers of a thickness and Poisson
+# ratio; by path, settings, time and size of the file.
 _KNOWN: dict[tuple, Topography] = {}
+_KNOWN_ON_LAYERS: dict[tuple, FullContact] = {}
 
 
-def inspect_file(section: MeasuredSurface | FileSurface | SpectrumSurface) -> Topography:
-    """Return the properties of a surface from a file; an unchanged file is read only once."""
+def _version_of_file(section):
+    """Return a key of a section and its file that changes with the settings and with the file."""
     try:
         stat = os.stat(section.path)
         version = stat.st_mtime_ns, stat.st_size
     except (OSError, ValueError):  # `read_surface` reports the error
         version = None
-    key = section.path, section.model_dump_json(), version
+    return section.path, section.model_dump_json(), version
+
+
+def inspect_file(section: MeasuredSurface | FileSurface | SpectrumSurface) -> Topography:
+    """Return the properties of a surface from a file; an unchanged file is read only once."""
+    key = _version_of_file(section)
     if key not in _KNOWN:
         from icha.surfaces.resolution import shortest_wave
 
@@ -80,14 +90,22 @@ def inspect_file(section: MeasuredSurface | FileSurface | SpectrumSurface) -> To
             # File names contain the slope with six digits; no instrument is more accurate.
             float(f"{slope:.6g}"),
             sha256_of(Path(section.path)),
-            surface.full_contact_energy / surface.rms_slope**2,
-            surface.complete_contact_pressure / surface.rms_slope,
+            surface.full_contact().scaled(1 / surface.rms_slope),
             height / slope,
             surface.rms_curvature / surface.rms_slope,
             shortest_wave(surface),
             repeated,
         )
     return _KNOWN[key]
+
+
+def full_contact_on_layer(section: MeasuredSurface | FileSurface | SpectrumSurface, material: Material) -> FullContact:
+    """Return the full contact of a surface from a file with a layer, at rms slope 1; an unchanged file is read once."""
+    key = *_version_of_file(section), material.thickness, material.poisson_ratio
+    if key not in _KNOWN_ON_LAYERS:
+        surface = read_surface(section)
+        _KNOWN_ON_LAYERS[key] = surface.full_contact(softness_of(material)).scaled(1 / surface.rms_slope)
+    return _KNOWN_ON_LAYERS[key]
 
 
 def read_topography(section: MeasuredSurface) -> PreparedTopography:

@@ -6,8 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
-from scipy.special import j0
 
 from icha.asperity.material import Material
 
@@ -61,6 +59,10 @@ def layer_correction(r: np.ndarray, layer: Layer) -> np.ndarray:
     It is the Hankel transform (1/pi t) int (phi(a) - 1) J0(a r/t) exp(-a^2/(24 t^2)) da. The factor exp averages over a
     cell. Farther than `_FAR` thicknesses, a layer is not displaced.
     """
+    # Slow to import; a campaign is read without them.
+    from scipy.interpolate import make_interp_spline
+    from scipy.special import j0
+
     t = layer.thickness
     far = min(_FAR * t, float(np.max(r)))
     # phi - 1 vanishes as exp(-2a). The nodes resolve the oscillations of J0 up to `far`.

@@ -3,12 +3,17 @@
 import math
 from functools import cache
 
-from icha.asperity.full_contact import gaussian_complete_pressure
 from icha.asperity.material import VAN_DER_WAALS_RANGE, WU_HOLDS_FROM
 from icha.asperity.stickiness import stickiness, sticky_rms_height
 from icha.asperity.tabor import describe_short_range
 from icha.configuration.campaign import Campaign
-from icha.configuration.plausibility import energy_ratio, resolution_of_smooth, rms_curvature, tabor_parameter
+from icha.configuration.plausibility import (
+    energy_ratio,
+    full_contact,
+    resolution_of_smooth,
+    rms_curvature,
+    tabor_parameter,
+)
 from icha.configuration.surfaces import SelfAffineSurface
 from icha.configuration.topographies import read_surface
 from icha.contact.attraction import straight_strength
@@ -57,14 +62,13 @@ def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
     """Return, by name, those properties of a surface at rms slope 1 that decide whether the contact models are valid.
 
     Random surfaces are assumed to be Gaussian and isotropic; surfaces from files have the properties of their heights.
-    Beside `icha.planning.statements.VALIDATED`, these are the number of summits that the asperity model uses, the rms
-    height in m, and the pressure of complete contact divided by E*, which is estimated for random surfaces.
+    Beside `icha.planning.statements.VALIDATED`, these are the number of summits that the asperity model uses, and the
+    rms height in m.
     """
     section = campaign.surfaces[name]
     if isinstance(section, SelfAffineSurface):
         moments, unsupported = self_affine_moments(*section.lengths_and_hurst), 0
         summits = section.period**2 * summit_density(moments.m2, moments.m4)
-        complete = gaussian_complete_pressure(section.period / section.short_wavelength)
         skewness, kurtosis, anisotropy, free = 0.0, 3.0, 1.0, section.free
     else:
         from icha.surfaces.summits import locate_summits
@@ -74,7 +78,6 @@ def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
         anisotropy, free = slope_anisotropy(surface), surface.free
         found = locate_summits(surface)
         summits, unsupported = len(found), len(found.unsupported_height)
-        complete = campaign.topographies[name].complete_contact_pressure
     every = summits + unsupported
     return {
         "slope_anisotropy": anisotropy,
@@ -86,7 +89,6 @@ def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
         "free_edges": float(free),
         "summits": summits,
         RMS_HEIGHT: math.sqrt(moments.m0 / (2 * moments.m2)),
-        COMPLETE_PRESSURE: complete,
     }
 
 
@@ -117,7 +119,7 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
         known |= {
             DIRECTION: material.receding.surface_energy / material.surface_energy if material.surface_energy else 1.0,
             SHAPED: float(campaign.surfaces[case.surface].shape is not None),
-            COMPLETE_PRESSURE: facts[COMPLETE_PRESSURE] * case.rms_slope * material.contact_modulus,
+            COMPLETE_PRESSURE: full_contact(campaign, case).complete_pressure * material.contact_modulus,
             STRENGTH: material.receding.interface_strength,
             THEORETICAL: material.receding.theoretical_strength,
         }
@@ -126,7 +128,9 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
             exact = campaign.studies[case.study].rms_heights is not None
             height = section.rms_height_at_unit_slope if exact else facts[RMS_HEIGHT]
             known[RMS_HEIGHT] = case.rms_slope * height
-            known[STICKY_HEIGHT] = sticky_rms_height(section.rolloff_wavelength, material)
+            # The bearing area model is for half-spaces.
+            if not material.layered:
+                known[STICKY_HEIGHT] = sticky_rms_height(section.rolloff_wavelength, material)
         # The error of loops is known for one work of adhesion only.
         adhesive = material.surface_energy > 0 and not material.directed
         if MODELS[case.model].by_cells and campaign.studies[case.study].unload and adhesive and not section.shape:

@@ -23,7 +23,7 @@ from icha.references.limits import tabor_parameter_of
 from icha.simulation.record import PULL_OFF, PathRecord
 from icha.surfaces.moments import height_statistics, slope_anisotropy, spectral_moments
 from icha.surfaces.resolution import shortest_wave
-from icha.surfaces.surface import Surface, full_contact_pressure
+from icha.surfaces.surface import Surface
 
 _STICKINESS_PAPER = "L. Pastewka and M. O. Robbins, PNAS 111 (2014) 3298-3303, doi:10.1073/pnas.1320846111 (stickiness)"
 
@@ -125,10 +125,8 @@ def _surface_values(surface: Surface, material: Material, seed: int) -> dict:
     """Return the values of the surface and the material, by variable name."""
     moments, (skewness, kurtosis) = spectral_moments(surface), height_statistics(surface)
     wavelength, estimated = shortest_wave(surface)
-    # Pressure in full contact at zero load, for E* = 1. Half its work on the heights is the elastic energy.
-    pressure = full_contact_pressure(surface.heights, surface.period, free=surface.free, softness=softness_of(material))
-    complete = 0.0 - float(pressure.min()) * material.contact_modulus  # not -0.0 for a smooth shape
-    energy = float(np.vdot(surface.heights, pressure)) / (2 * pressure.size)
+    energy, complete = surface.full_contact(softness_of(material))
+    complete *= material.contact_modulus
     return {
         **get_values(material, *MATERIAL, "flaw_radius"),
         **get_values(surface, *ROUGHNESS, "unit_height", "unit_slope", "period", "boundary", "grid"),

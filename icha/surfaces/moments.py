@@ -7,6 +7,7 @@ Technol. 93 (1971) 398-407, doi:10.1115/1.3451608.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 _NO_SLOPE = 1e-12
 # Waves up to this wave number, in units of 2 pi/L, are summed. An integral replaces the sum over shorter waves.
 _DENSE = 64
+# Number of nodes of the quadrature on each side of the roll-off; for each power law, it is exact to rounding.
+_QUADRATURE = 64
 
 
 def summit_density(m2: float, m4: float) -> float:
@@ -43,14 +46,53 @@ def self_affine_integral(order: int, start: float, end: float, roll: float, hurs
     return up_to(end) - up_to(start)
 
 
-@lru_cache
-def self_affine_full_contact_energy(
-    period: float, rolloff_wavelength: float, short_wavelength: float, hurst: float
-) -> float:
-    """Compute the energy of full contact, divided by area and E*, m, for a self-affine surface with rms slope 1.
+class FullContact(NamedTuple):
+    """Full contact of a surface with an elastic body at zero load; both values are divided by E*.
 
-    Lengths are in m. The result equals `Surface.full_contact_energy` of surfaces with the same `SelfAffineSpectrum`,
-    but needs no heights. The function sums over the long waves and integrates the spectrum of the short waves.
+    Attributes
+    ----------
+    energy : elastic energy per nominal area, m.
+    complete_pressure : largest tension; this nominal pressure makes contact without adhesion complete.
+    """
+
+    energy: float
+    complete_pressure: float
+
+    def scaled(self, factor: float) -> FullContact:
+        """Return the values for heights that are multiplied by a factor."""
+        return FullContact(self.energy * factor**2, self.complete_pressure * factor)
+
+
+def largest_gaussian_value(waves: float) -> float:
+    """Estimate the largest value of a Gaussian field of standard deviation 1 in a square.
+
+    About the values u with N u exp(-u^2/2) = 1, N = sqrt(pi/2) waves^2, the largest value has Gumbel's distribution.
+    The mean of this distribution is u + 0.577/u: R. J. Adler, The Geometry of Random Fields, 1981, chapter 6.
+
+    waves : root mean square of the wave number |q|, divided by 2 pi/L; L is the side.
+    """
+    # For smaller numbers, the equation has no solution.
+    number, u = max(math.sqrt(math.pi / 2) * waves**2, math.e), 2.0
+    for _ in range(40):
+        u = math.sqrt(2 * math.log(number * u))
+    return u + float(np.euler_gamma) / u
+
+
+@lru_cache
+def self_affine_full_contact(
+    period: float,
+    rolloff_wavelength: float,
+    short_wavelength: float,
+    hurst: float,
+    softness: Callable[[np.ndarray], np.ndarray] | None = None,
+) -> FullContact:
+    """Compute the full contact of a periodic self-affine surface with rms slope 1; the pressure is an estimate.
+
+    Lengths are in m, and `softness` is that of `icha.surfaces.surface.full_contact_pressure`. The energy equals that of
+    surfaces with the same `SelfAffineSpectrum`, but needs no heights: the function sums over the long waves and
+    integrates the spectrum of the short waves. The pressure is the largest value that is expected of a Gaussian field.
+    For five spectra it was within 6 % of the mean of six surfaces on half-spaces, and within 16 % on layers whose
+    thickness was 1/4 to 1/200 of the period.
     """
     roll, last = period / rolloff_wavelength, period / short_wavelength
     # The wave at the cut-off does not belong to the spectrum, even if `last` is rounded up.
@@ -58,12 +100,19 @@ def self_affine_full_contact_energy(
     k = np.arange(-math.ceil(dense), math.ceil(dense) + 1)
     k = np.hypot(k[:, None], k).ravel()
     k = k[(k > 0) & (k < dense)]
-
-    def moment(order):
-        total = np.sum(np.maximum(k / roll, 1.0) ** (-2 * (1 + hurst)) * k**order)
-        return float(total) + 2 * math.pi * self_affine_integral(order + 1, dense, last, roll, hurst)
-
-    return period * moment(1) / (8 * math.pi * moment(2))
+    weight = np.ones(len(k))
+    # Quadrature over log k on both sides of the roll-off.
+    node, node_weight = np.polynomial.legendre.leggauss(_QUADRATURE)
+    middle = min(max(roll, dense), last)
+    for start, end in ((dense, middle), (middle, last)):
+        half = math.log(end / start) / 2
+        rings = start * np.exp(half * (node + 1))
+        k, weight = np.append(k, rings), np.append(weight, 2 * math.pi * rings**2 * half * node_weight)
+    weight *= np.maximum(k / roll, 1.0) ** (-2 * (1 + hurst))
+    stiffness = k / softness(2 * math.pi / period * k) if softness else k
+    slope, pressure, gradient = (float(np.sum(weight * each**2)) for each in (k, stiffness, k * stiffness))
+    largest = largest_gaussian_value(math.sqrt(gradient / pressure)) * math.sqrt(pressure / slope) / 2
+    return FullContact(period * float(np.sum(weight * stiffness)) / (8 * math.pi * slope), largest)
 
 
 class SpectralMoments(NamedTuple):

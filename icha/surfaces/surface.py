@@ -21,6 +21,7 @@ from icha.support.formatting import format_quantity, html_table
 from icha.support.parallel import blocks, on_cores
 from icha.support.rules import LENGTH, SLOPE, FloatRange, IntegerRange
 from icha.support.usual import IchaWarning, unusual_arguments
+from icha.surfaces.moments import FullContact
 
 if TYPE_CHECKING:
     from icha.surfaces.shapes import Shape
@@ -277,30 +278,25 @@ class Surface:
         """
         return (3 / 8 * self.spectral_moments[2]) ** 0.5
 
-    @property
-    def full_contact_energy(self) -> float:
-        """Elastic energy of full contact per nominal area, divided by E*: U_full/E* = 1/4 sum q |h_q|^2, m.
+    def full_contact(self, softness: Callable[[np.ndarray], np.ndarray] | None = None) -> FullContact:
+        """Return energy and largest tension of full contact at zero load, with `softness` of `full_contact_pressure`.
 
-        In full contact the pressure q E* h_q/2 flattens a wave of amplitude h_q. A free square counts as a quarter of a
+        Half the work of the pressure on the heights is the elastic energy. A free square counts as a quarter of a
         periodic surface that consists of the square and its mirror images. This surface has no steps at the edges.
         """
-        if not self.free:
-            sums = self.by_wave_vector(lambda k2, _, power: float(np.sum(np.sqrt(k2) * power)))
-            return math.pi / (2 * self.period) * sum(sums)
-        # Cosine series of period 2 L. The coefficients are orthonormal, so the sum of their squares, divided by the
-        # number of nodes, is the mean square height (Parseval).
-        power = scipy.fft.dctn(self.heights, norm="ortho", workers=1) ** 2
-        k2 = np.arange(self.grid) ** 2.0
-        return math.pi / (4 * self.period) * float(np.sum(np.sqrt(k2[:, None] + k2) * power)) / power.size
+        pressure = full_contact_pressure(self.heights, self.period, free=self.free, softness=softness)
+        # The zero avoids -0.0 for a smooth surface.
+        return FullContact(float(np.vdot(self.heights, pressure)) / (2 * pressure.size), 0.0 - float(pressure.min()))
+
+    @property
+    def full_contact_energy(self) -> float:
+        """Elastic energy of full contact with a half-space per area, divided by E*: 1/4 sum q |h_q|^2, m."""
+        return self.full_contact().energy
 
     @property
     def complete_contact_pressure(self) -> float:
-        """Nominal pressure, divided by E*, at which a surface without adhesion is in complete contact.
-
-        This pressure equals the largest tension in full contact at zero load. A free square counts as a quarter of a
-        periodic surface that consists of the square and its mirror images.
-        """
-        return -float(full_contact_pressure(self.heights, self.period, free=self.free).min())
+        """Nominal pressure, divided by E*, of complete contact with a half-space without adhesion."""
+        return self.full_contact().complete_pressure
 
     def scaled_to_rms_slope(self, rms_slope: float) -> Surface:
         """Return the surface with heights scaled to the rms slope `rms_slope`; a smooth surface is not scaled."""

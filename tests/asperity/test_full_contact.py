@@ -7,14 +7,15 @@ import pytest
 from scipy.special import ndtr
 
 import icha
-from icha.asperity.full_contact import full_contact_energy_ratio, gaussian_complete_pressure
+from icha.asperity.full_contact import full_contact_energy_ratio
 from icha.asperity.material import Material
 from icha.asperity.stickiness import sticky_rms_height
 from icha.datasets.campaign import select_run
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.files import read_run, write_dataset
 from icha.datasets.format import RUN, problems_with_file
-from icha.surfaces.moments import self_affine_full_contact_energy
+from icha.half_space.layer import Layer
+from icha.surfaces.moments import self_affine_full_contact
 
 L, A = 3e-6, 1e-8
 
@@ -25,6 +26,18 @@ def test_a_single_wave_takes_a_quarter_of_the_wave_number_times_its_mean_square(
     k = 2 * np.pi / L * np.array(waves)
     surface = icha.Surface(A * np.cos(k[0] * x[None, :] + k[1] * x[:, None]), L)
     assert surface.full_contact_energy == pytest.approx(np.hypot(*k) * A**2 / 8)
+
+
+@pytest.mark.parametrize("poisson", [0.3, 0.5])
+def test_a_layer_stiffens_a_wave_by_its_compliance(poisson):
+    """Energy q Delta^2/(8 phi) and largest tension q Delta/(2 phi), divided by E*; phi by Johnson (1985), sec. 13.5."""
+    q, a = 2 * np.pi / L, 2 * np.pi / 10
+    phi = ((3 - 4 * poisson) * np.sinh(2 * a) - 2 * a) / (
+        (3 - 4 * poisson) * np.cosh(2 * a) + 2 * a**2 + 5 - 12 * poisson + 8 * poisson**2
+    )
+    wave = icha.Surface(A * np.cos(q * np.arange(32) * L / 32)[None, :] + np.zeros((32, 1)), L)
+    found = wave.full_contact(Layer(L / 10, poisson).factor)
+    assert found == pytest.approx((q * A**2 / (8 * phi), q * A / (2 * phi)))
 
 
 def test_a_free_square_has_the_energy_of_its_mirror_images():
@@ -38,20 +51,23 @@ def test_a_free_square_has_the_energy_of_its_mirror_images():
     assert icha.Surface(heights, L, "free").full_contact_energy == pytest.approx(expected)
 
 
+@pytest.mark.parametrize("thickness", [math.inf, 10e-6, 1e-6])
 @pytest.mark.parametrize(
     "lengths",
     [(100e-6, 20e-6, 1.5625e-6, 0.8), (100e-6, 50e-6, 1e-6, 0.3), (90e-6, 90e-6, 30e-6, 0.8), (1e-3, 8e-6, 6e-6, 0.5)],
 )
-def test_of_a_self_affine_surface_it_is_known_without_making_one(lengths):
+def test_of_a_self_affine_surface_it_is_known_without_making_one(lengths, thickness):
     grid = math.ceil(2 * lengths[0] / lengths[2]) + 2
     with pytest.warns(UserWarning, match="cells per shortest"):
         surface = icha.SelfAffineSpectrum(*lengths).realise(grid, 1)
-    assert self_affine_full_contact_energy(*lengths) == pytest.approx(surface.full_contact_energy, rel=1e-3)
+    softness = Layer(thickness, 0.4).factor if thickness < math.inf else None
+    exact = surface.full_contact(softness).energy
+    assert self_affine_full_contact(*lengths, softness).energy == pytest.approx(exact, rel=1e-3)
 
 
 def test_the_ratio_of_a_sticky_silicone_is_known():
     spectrum = icha.SelfAffineSpectrum(40e-6, 10e-6, 0.2e-6, 0.8)
-    energy = self_affine_full_contact_energy(40e-6, 10e-6, 0.2e-6, 0.8) * (100e-9 / spectrum.rms_height) ** 2
+    energy = self_affine_full_contact(40e-6, 10e-6, 0.2e-6, 0.8).energy * (100e-9 / spectrum.rms_height) ** 2
     assert full_contact_energy_ratio(energy, 2.667e6, 0.05) == pytest.approx(0.138, abs=5e-4)
     assert full_contact_energy_ratio(energy, 2.667e6, 0.0) == math.inf
 
@@ -95,12 +111,13 @@ def test_a_wave_is_complete_at_johnsons_pressure(boundary):
 
 @pytest.mark.parametrize(("rolloff", "waves", "hurst"), [(5, 64, 0.8), (4, 16, 0.8), (1, 33, 0.5)])
 def test_estimate_of_the_pressure_for_complete_contact(rolloff, waves, hurst):
-    """Within a tenth of the mean of eight realisations."""
-    spectrum = icha.SelfAffineSpectrum(
-        period=1e-4, rolloff_wavelength=1e-4 / rolloff, short_wavelength=1e-4 / waves, hurst=hurst, rms_slope=1.0
-    )
-    pressures = [spectrum.realise(grid=8 * waves, seed=seed).complete_contact_pressure for seed in range(1, 9)]
-    assert gaussian_complete_pressure(waves) == pytest.approx(np.mean(pressures), rel=0.1)
+    """Within a tenth of the mean of eight realisations on half-spaces, and within a fifth on layers."""
+    lengths = 1e-4, 1e-4 / rolloff, 1e-4 / waves, hurst
+    surfaces = [icha.SelfAffineSpectrum(*lengths, rms_slope=1.0).realise(8 * waves, seed) for seed in range(1, 9)]
+    for softness, error in ((None, 0.1), *((Layer(1e-6, poisson).factor, 0.2) for poisson in (0.3, 0.5))):
+        pressures = [surface.full_contact(softness).complete_pressure for surface in surfaces]
+        estimate = self_affine_full_contact(*lengths, softness).complete_pressure
+        assert estimate == pytest.approx(np.mean(pressures), rel=error)
 
 
 def test_a_flaw_lowers_the_strength_to_that_of_a_penny_shaped_crack():

@@ -11,6 +11,7 @@ from icha.asperity.material import Material
 from icha.asperity.stickiness import stickiness
 from icha.configuration.plausibility import rms_curvature
 from icha.datasets.labels import RunLabels
+from icha.half_space.layer import softness_of
 from icha.planning.validity import expected_validity
 from icha.surfaces.measured.topography import prepared_topography
 from icha.surfaces.moments import spectral_moments
@@ -60,6 +61,52 @@ def test_surfaces_that_stick_are_named_before_the_run(read):
     exact = stickiness(moments, Material(1e6, 0.5, 8e-9))
     told = re.fullmatch(r"attraction outweighs repulsion: inside on rough \(stickiness (\S+)\); .*", said.text)
     assert exact > 1 and float(told.group(1)) == pytest.approx(exact, rel=0.1) and not said.good
+
+
+FILM = {"contact_modulus": "2 MPa", "surface_energy": "5 mJ/m^2", "thickness": "10 um", "poisson_ratio": 0.4}
+ON_LAYERS = {
+    "confirmed": ["surfaces.scan.grid"],
+    "surfaces.wave": {"kind": "file", "path": "wave.npy", "height_unit": "um", "period": "100 um"},
+    "surfaces.scan": measured_surface(path="scan.npy", size="50 um", height_unit="um"),
+    "materials.soft": FILM | {"interaction_range": "20 nm"},
+    "studies.one": {
+        "surfaces": ["wave"],
+        "materials": ["soft"],
+        "rms_slopes": ["measured"],
+        "models": ["boundary_elements"],
+        "targets": {"pressures": ["10 kPa"]},
+    },
+}
+
+
+def test_a_wave_on_a_layer_has_its_pressures_and_energy_before_the_run(read, tmp_path):
+    """q Delta^2 E*/(8 phi dgamma) = 15.4, E* q Delta/(2 phi) = 308.5 kPa; phi by K. L. Johnson (1985), sec. 13.5."""
+    x = np.arange(96) / 96
+    np.save(tmp_path / "wave.npy", np.cos(2 * np.pi * x)[None, :] + np.zeros((96, 1)))
+    (adhesion,) = (each for each in expected_validity(read(ON_LAYERS)) if each.about == "adhesion")
+    a, nu = 0.2 * np.pi, 0.4
+    above = (3 - 4 * nu) * np.sinh(2 * a) - 2 * a
+    pressure = 2e6 * np.pi / 100 * ((3 - 4 * nu) * np.cosh(2 * a) + 2 * a**2 + 5 - 12 * nu + 8 * nu**2) / above
+    strength = 16 * 5e-3 / (9 * np.sqrt(3) * 20e-9)
+    assert f"U_full/dgamma is about {pressure * 1e-6 / 4 / 5e-3:.3g} or more" in adhesion.text
+    assert f"complete at about {round(pressure, -4) / 1e3:g} kPa" in adhesion.text
+    assert f"opens at about {(pressure - strength) / 1e3:.2g} kPa" in adhesion.text
+    assert adhesion.text.startswith("closes under load only") and adhesion.good
+
+
+@pytest.mark.parametrize("name", ["rough", "scan"])
+def test_rough_surfaces_on_layers_have_the_energy_of_their_runs_before_the_run(name, read):
+    slope = {"studies.one.surfaces": [name], "studies.one.rms_slopes": [0.05]}
+    campaign = read(CHANGES | ON_LAYERS | slope)
+    (adhesion,) = (each.text for each in expected_validity(campaign) if each.about == "adhesion")
+    surface = small.surface()
+    if name == "scan":
+        section = campaign.surfaces["scan"]
+        surface = prepared_topography(section.path, section.preparation).surface
+    energy = surface.scaled_to_rms_slope(0.05).full_contact(softness_of(campaign.materials["soft"].material)).energy
+    (ratio,) = re.findall(r"U_full/dgamma is about (\S+) or more", adhesion)
+    assert float(ratio) == pytest.approx(energy * 2e6 / 5e-3, rel=0.01)
+    assert "bearing area" not in adhesion, "its laws are those of a half-space"
 
 
 def smooth(**shape):
