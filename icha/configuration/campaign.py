@@ -309,32 +309,27 @@ class Campaign(Section):
             if Target(kind, value).needs_adhesion and (value < 0 or location[0] != "turning_points"):
                 yield location, value, f"{WITHOUT_ADHESION} of {without[0]!r}"
 
-    def contact_radii(self, study: Study, surface: str, material: str) -> dict[tuple, float]:
-        """Return the radii (m) of the contacts that theory expects of a smooth shape, by location of kind and value.
+    def contact_radii(self, study: Study, surface: str, material: str) -> dict[tuple, tuple[str, float]]:
+        """Return the radii (m) of the contacts that theory expects of a smooth shape on a half-space, by location.
 
-        The locations are those of targets and turning points; () is the contact after the jump-in, with adhesion. On a
-        layer without adhesion, the radius at an indentation is that of a half-space, which is smaller. With adhesion
-        the contact on a layer may be smaller than on a half-space, so only radii that are targets are known.
+        The locations are those of targets and turning points; () is the contact after the jump-in, with adhesion. In
+        front of each radius stands the prescribed quantity: CONTACT_RADIUS, INDENTATION or FORCE. A layer counts as a
+        half-space.
         """
         from icha.references.indentation import contact_radius_at
         from icha.references.limits import convert_target
 
         shape, section, side = self.surfaces[surface].shape.shape, self.materials[material], self.period(surface)
-        adhesive, layer = section.surface_energy > 0, section.thickness is not None
 
         def radius(quantity, value):
             if quantity == CONTACT_RADIUS:
                 return value
             return contact_radius_at(quantity, value, shape, section.contact_modulus, section.surface_energy)
 
-        known = {CONTACT_RADIUS}
-        known |= set() if layer and adhesive else {INDENTATION}
-        known |= set() if layer else {FORCE}
-        radii = {(): radius(INDENTATION, 0.0)} if adhesive and not layer else {}
+        radii = {(): (INDENTATION, radius(INDENTATION, 0.0))} if section.surface_energy else {}
         for location, kind, value in study.states():
             quantity, value = convert_target(shape, side, section.contact_modulus, kind, value)
-            if quantity in known:
-                radii[location] = radius(quantity, value)
+            radii[location] = quantity, radius(quantity, value)
         return radii
 
     def _edge_problems(self, study: Study) -> Iterator[Problem]:
@@ -344,10 +339,15 @@ class Campaign(Section):
             side = getattr(self._grid_and_period(name), "period", None)
             if side is None or not self.surfaces[name].shape:
                 continue
-            radii = self.contact_radii(study, name, label)
-            for location, a in radii.items():
+            radii, material = self.contact_radii(study, name, label), self.materials[label]
+            # At an indentation without adhesion, the contact on a layer is larger than on a half-space. At a force, or
+            # with adhesion, it may be smaller.
+            bounded = {CONTACT_RADIUS, INDENTATION, FORCE}
+            if material.thickness is not None:
+                bounded = {CONTACT_RADIUS} if material.surface_energy else {CONTACT_RADIUS, INDENTATION}
+            for location, (quantity, a) in radii.items():
                 # Roughness may prevent the jump-in of the smooth shape.
-                if 2 * a > side and (location or self.surfaces[name].smooth):
+                if quantity in bounded and 2 * a > side and (location or self.surfaces[name].smooth):
                     radius, given, least = (formatting.length(each, 3) for each in (a, side, 3 * a))
                     reason = f"gives {label!r} on {name!r} a contact radius of about {radius}"
                     reason += "" if location else " after the jump-in"
@@ -357,7 +357,7 @@ class Campaign(Section):
             yield from self._jump_in_problems(study, name, label, radii)
 
     def _jump_in_problems(
-        self, study: Study, surface: str, material: str, radii: dict[tuple, float]
+        self, study: Study, surface: str, material: str, radii: dict[tuple, tuple[str, float]]
     ) -> Iterator[Problem]:
         """Yield a problem for a target contact smaller than that of pull-off: a smooth sphere jumps over it.
 
@@ -373,7 +373,7 @@ class Campaign(Section):
         reason = f"lies inside the jump into contact of {material!r} on {surface!r}, which pulls off from a"
         reason += f" contact radius of {formatting.length(radius, 3)}; expected larger contacts, or `indentations`"
         for location, kind, value in study.states():
-            if location[0] == "targets" and kind in AREAS and radii[location] < radius:
+            if location[0] == "targets" and kind in AREAS and radii[location][1] < radius:
                 yield location, value, reason
                 return
 

@@ -175,7 +175,7 @@ def _indenters(campaign):
     own, largest, layers, unloaded = campaign.own_studies, {}, {}, set()
     for study, surface, name in dict.fromkeys((case.study, case.surface, case.material) for case in campaign.all_runs):
         if campaign.surfaces[surface].shape and study in own:
-            radii = campaign.contact_radii(campaign.studies[study], surface, name).values()
+            radii = [radius for _, radius in campaign.contact_radii(campaign.studies[study], surface, name).values()]
             largest[surface, name] = max(0.0, *radii, largest.get((surface, name), 0.0))
             unloaded |= {(surface, name)} if campaign.studies[study].unload else set()
     if not largest:
@@ -188,10 +188,11 @@ def _indenters(campaign):
         side, energy = campaign.period(surface), material.surface_energy
         properties = shape, material.contact_modulus, energy
         cells = campaign.grid(surface) / side
-        at_rest = contact_radius_at("force", 0.0, *properties) if energy else 0.0
         if material.thickness:
-            layers[f"{name} on {surface} (as on a half-space)"] = max(radius, at_rest) / material.thickness
+            if radius:
+                layers[f"{name} on {surface} (as on a half-space)"] = radius / material.thickness
             continue
+        at_rest = contact_radius_at("force", 0.0, *properties) if energy else 0.0
         found = [f"at most {format_quantity(max(radius, at_rest), 'm')}"] if radius else []
         if energy:
             jumped = format_quantity(contact_radius_at("indentation", 0.0, *properties), "m")
