@@ -40,7 +40,7 @@ def interpolate(load, values, at, *, logarithmic: bool) -> np.ndarray:
     ----------
     load, values : points of the curve at positive loads, in any order. Only the first of several equal loads is used.
     at : loads within the range of the curve.
-    logarithmic : True to interpolate the logarithm of the values, which must then be positive.
+    logarithmic : True to interpolate the logarithm of the values, if all values are positive.
 
     Raises
     ------
@@ -60,6 +60,7 @@ def interpolate(load, values, at, *, logarithmic: bool) -> np.ndarray:
     x = np.log(np.clip(at, load[0], load[-1]))
     if len(load) == 1:
         return np.full(at.shape, values[0])
+    logarithmic = logarithmic and bool((values > 0).all())
     curve = PchipInterpolator(np.log(load), np.log(values) if logarithmic else values)
     return np.exp(curve(x)) if logarithmic else curve(x)
 
@@ -170,7 +171,7 @@ def at_common_loads(
     Parameters
     ----------
     curves : loads and values of every member.
-    logarithmic : True to interpolate the logarithm of the values, which must then be positive.
+    logarithmic : True to interpolate the logarithm of the values of a member, if all these values are positive.
 
     Returns
     -------

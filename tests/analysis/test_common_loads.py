@@ -126,3 +126,11 @@ def test_separations_of_a_free_square_are_compared_by_its_mean_gap():
     )
     np.testing.assert_allclose(reduced_gap(study), [[2.0, 1.0], [3.0, 1.0]])
     np.testing.assert_allclose(reduced_gap(study.isel(surface=1)), [3.0, 1.0])
+
+
+def test_a_curve_that_is_below_zero_somewhere_is_averaged_too():
+    loads = np.array([1.0, 2.0, 4.0])
+    curves = [(loads, np.array([3.0, 1.0, -1.0])), (loads[:2], np.array([3.0, 1.0]))]
+    at, values = at_common_loads(curves, logarithmic=True)
+    assert at[0] == 1 and at[-1] == pytest.approx(2) and np.isfinite(values).all()
+    np.testing.assert_allclose(values[:, [0, -1]], [[3, 1], [3, 1]])
