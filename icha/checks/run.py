@@ -11,7 +11,7 @@ from icha.checks.loops import EVENT_COUNTS, OF_ENERGIES, OF_LOOPS, check_loop, f
 from icha.contact.attraction import FINITE_RANGE, SHORT_RANGE
 from icha.contact.model import AREA_FRACTION, PRESSURE
 from icha.contact.models import AREA_TOLERANCE_CELLS, AREA_TOLERANCE_PART, SMALLEST_LOAD, model_of
-from icha.datasets.variables.run import INDENTER, OF_MODELS, RUN
+from icha.datasets.variables.run import INDENTER, LOOP, OF_MODELS, RUN
 from icha.datasets.variables.terms import INFINITE
 from icha.path.targets import AREAS, BETWEEN, LOADS, MEAN_SEPARATION, QUANTITIES
 
@@ -28,7 +28,7 @@ CELL_LIMIT = 1e-3
 # larger separation.
 SEPARATION_RISE_LIMIT = 1e-2
 _MAY_BE_INFINITE = {
-    name for name, description in (RUN | OF_MODELS | INDENTER).items() if INFINITE in description.further
+    name for name, description in (RUN | LOOP | OF_MODELS | INDENTER).items() if INFINITE in description.further
 }
 
 # Meanings of all checks by name.

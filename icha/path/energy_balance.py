@@ -9,6 +9,7 @@ release if its spot were alone.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -242,6 +243,7 @@ def summarise_loop(
     contacts = (k for k, row in enumerate(rows) if row["spot_count"] and row["contact_area_fraction"] >= least_area)
     touching = rows[max(contacts, default=0)]
     tension = max(0.0, -rows[pull_off_row]["nominal_pressure"])
+    over_summits = tension / summit_pull_off_pressure if summit_pull_off_pressure else math.inf
     # No energy is stored at the start and at the end of the loop, so the whole work is lost.
     loss = last["work"]
     losses = {f"loss_{name}": last[f"dissipated_{name}"] for name in _LOSSES}
@@ -250,7 +252,7 @@ def summarise_loop(
         "pull_off_pressure": tension,
         "pull_off_separation": rows[pull_off_row]["mean_separation"],
         "pull_off_over_strength": tension / material.receding.interface_strength if adhesive else 0.0,
-        "pull_off_over_summits": tension / summit_pull_off_pressure if summit_pull_off_pressure else 0.0,
+        "pull_off_over_summits": over_summits if adhesive else 0.0,
         "detachment_pressure": touching["nominal_pressure"] if adhesive else 0.0,
         "detachment_separation": touching["mean_separation"],
         "hysteresis_loss": loss,

@@ -16,6 +16,7 @@ from scipy.optimize import brentq
 
 import icha
 from icha import Material, Path
+from icha.checks.run import check_run
 from icha.contact.model import COALESCENCE, JUMP_OFF, SPLIT, events_between
 from icha.contact.models import PathAccuracy
 from icha.path.step_accuracy import StepAccuracy
@@ -237,3 +238,12 @@ def test_an_edge_of_contact_within_the_accuracy_of_the_solver_is_passed():
     most = 1.5 * np.pi * 0.05 * radius / period**2
     assert float(run.pull_off_pressure) == pytest.approx(most, rel=1e-6)
     assert float(run.detachment_pressure) == pytest.approx(-5 / 9 * most, rel=1e-3)
+
+
+def test_a_wave_without_summits_has_no_pull_off_of_summits():
+    n = 16
+    surface = icha.Surface(np.tile(1e-3 * np.cos(2 * np.pi * np.arange(n) / n), (n, 1)), 1.0)
+    run = icha.simulate(surface, icha.Material(1.0, 1e-6, 1e-6), Path([1e-4], unload=True), model="boundary_elements")
+    assert float(run.asperity_count) == 0 and float(run.pull_off_pressure) > 0
+    assert np.isposinf(float(run.pull_off_over_summits))
+    assert all(check.passed for check in check_run(run) if check.name == "finite")

@@ -33,6 +33,7 @@ _ATTRIBUTES = {
     "stiffness": {INFINITE: "in full contact"},
     "short_wavelength": {INFINITE: "on a smooth shape without waves"},
     "tabor_parameter": {INFINITE: "on a smooth shape without a radius of curvature"},
+    "pull_off_over_summits": {INFINITE: "on a surface without summits"},
     "layer_thickness": {INFINITE: "for a half-space"},
     "slope_anisotropy": {INFINITE: "for straight grooves"},
     "gap_map": {INFINITE: "where a shape has no surface"},
