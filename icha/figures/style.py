@@ -38,6 +38,7 @@ RC = {
     "axes.linewidth": 0.7,
     "axes.titlesize": 9.5,
     "axes.titlepad": 4,
+    "axes.formatter.useoffset": False,
     "legend.fontsize": 8,
     "legend.frameon": False,
     "legend.handlelength": 2.2,
