@@ -15,6 +15,7 @@ from icha.datasets.variables.campaign import (
     NOT_IN_DESIGN,
     RAGGED,
     STATUS_ATTRIBUTES,
+    WHOLE_RUNS,
 )
 from icha.datasets.variables.run import FURTHER, INDENTER, OF_LOSS
 from icha.path.targets import BETWEEN
@@ -143,6 +144,42 @@ def reduced_gap(data: xr.Dataset) -> xr.DataArray:
 def loading_stops(data: xr.Dataset) -> xr.DataArray:
     """Return True for the steps of the first loading that have a target, in a run or in all runs of a study."""
     return (data["leg"] == 0) & (data["step_kind"] != BETWEEN)
+
+
+def runs_with_labels(study: xr.Dataset, **wanted: object) -> xr.DataArray:
+    """Return True for the runs of a study with these labels, which include `surface`."""
+    chosen = xr.full_like(study["status"], False, bool)
+    chosen[place_of(study, wanted)] = True
+    return chosen
+
+
+def runs_with_loop(study: xr.Dataset, name: str) -> xr.DataArray:
+    """Return True for the runs of a study that have a valid value `name` of their loop, such as the loss."""
+    if name not in study:
+        return xr.full_like(study["status"], False, bool)
+    invalid = (study["status"] == FAILED_LOSS) & (name in OF_LOSS)
+    return study[name].notnull() & ~invalid
+
+
+def runs_with_snapshot(study: xr.Dataset, kind: str | None = None, target: float | None = None) -> xr.DataArray:
+    """Return True for the runs of a study that reach the snapshot of `find_snapshot`."""
+    return study["overlap_fraction"].isel(snapshot=find_snapshot(study, kind, target)).notnull()
+
+
+def runs_with_unloading(study: xr.Dataset) -> xr.DataArray:
+    """Return True for the runs of a study that reach their first unloading."""
+    return (study["leg"] > 0).any("step")
+
+
+def whole_runs(study: xr.Dataset) -> xr.DataArray:
+    """Return True for the runs of a study whose whole path is a result."""
+    return study["status"].isin(WHOLE_RUNS)
+
+
+def runs_with_all_loads(study: xr.Dataset) -> xr.DataArray:
+    """Return True for the runs of a study that reach as many targets in the first loading as any other run."""
+    counts = loading_stops(study).sum("step")
+    return counts == counts.max()
 
 
 class NoSnapshot(ValueError):

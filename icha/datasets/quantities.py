@@ -86,7 +86,7 @@ _QUANTITIES = {
     "loss_by_load_jump": Quantity("jumps at constant load", "", "J m^-2"),
     "front_dissipation": Quantity("receding edge", "", "J m^-2"),
     "loss_unattributed": Quantity("unattributed", "", "J m^-2"),
-    "largest_contact_area_fraction": Quantity("contact area at the largest load", "A/A_0", scale="percent"),
+    "largest_contact_area_fraction": Quantity("largest contact area", "A/A_0", scale="percent"),
     "largest_reduced_pressure": Quantity("largest reduced pressure", _REDUCED),
     "work_of_adhesion_approach": Quantity("work of adhesion on approach", "", "J m^-2"),
     "work_of_adhesion_retraction": Quantity("work of adhesion on retraction", "", "J m^-2"),

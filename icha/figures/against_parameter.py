@@ -14,14 +14,14 @@ from icha.analysis.model_error import snapshot_if_any, state_of
 from icha.asperity.material import WU_HOLDS_FROM
 from icha.asperity.tabor import sphere_pull_off_factor
 from icha.contact.attraction import FINITE_RANGE, SHORT_RANGE
-from icha.datasets.campaign import find_snapshot
+from icha.datasets.campaign import find_snapshot, runs_with_loop, runs_with_snapshot
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import LOSS_PARTS, label_of
 from icha.figures import select
 from icha.figures.captions import attractions_of, grid_of_loops, range_of_attraction
 from icha.figures.curves import drop_rounding_errors, gap_name
-from icha.figures.drawn import Name, plot, record, say
-from icha.figures.ensembles import Points
+from icha.figures.drawn import Name, plot, record, say, show_runs
+from icha.figures.ensembles import Points, mark_fewer
 from icha.figures.looks import (
     ASPERITIES_NAME,
     REFERENCE_NAME,
@@ -59,13 +59,14 @@ def tabor(campaign: xr.DataTree, *, study: str, kind: str | None = None, target:
     if all(float(run.get("pull_off_force_over_jkr", 0)) and run["short_wavelength"] == np.inf for _, run in runs):
         return _pull_off_of_spheres([run for _, run in runs])
     groups = select.group_by_contact(campaign, runs)
-    shown = select.snapshot_label(groups[-1].first, find_snapshot(groups[-1].first, kind, target))
+    dataset = campaign[study].to_dataset()
+    state = select.kind_and_target(dataset, find_snapshot(dataset, kind, target))
     # Materials that differ only in the range of attraction form one line with the name of the first material.
     materials: dict[tuple, str] = {}
     curves: dict[select.Line, list[select.ContactRuns]] = {}
     bare: dict[select.Line, list[select.ContactRuns]] = {}
     for group in groups:
-        found = {seed: (run, snapshot_if_any(run, kind, target)) for seed, run in group.by_seed.items()}
+        found = {seed: (run, snapshot_if_any(run, *state)) for seed, run in group.by_seed.items()}
         states = {seed: state_of(run, at) for seed, (run, at) in found.items() if at is not None}
         if not states:
             continue
@@ -82,8 +83,9 @@ def tabor(campaign: xr.DataTree, *, study: str, kind: str | None = None, target:
     # The name of a material has no range of attraction, because lines of different ranges are one line.
     looks = Looks(campaign, [study], curves, only_drawn=True)
     fig, [panels] = new_panels(3.1)
-    quantities = ("contact_area_fraction", gap_name(campaign[study].to_dataset()))
+    quantities = ("contact_area_fraction", gap_name(dataset))
     say(fig, _RANGES, _TABOR)
+    show_runs(fig, study, runs_with_snapshot(dataset, *state), dataset["model"] == groups[0].labels.model)
     drawn = []
     for line, found in curves.items():
         points = Points(found, "tabor_parameter", *quantities)
@@ -93,15 +95,17 @@ def tabor(campaign: xr.DataTree, *, study: str, kind: str | None = None, target:
     for k, (line, found) in enumerate(bare.items()):
         look = {"color": looks.colour(line) if looks.by_place else GREY, "label": None if k else "no adhesion"}
         for ax, name in zip(panels, quantities, strict=True):
-            mean = np.mean([float(state[name]) for group in found for state in group.by_seed.values()])
-            record(ax, [min(drawn), max(drawn)], [mean, mean], found[0].drawn_name)
-            ax.axhline(mean, ls=(0, (5, 2)), lw=1, zorder=1, **look)
+            values = [float(state[name]) for group in found for state in group.by_seed.values()]
+            ends, means = [min(drawn), max(drawn)], np.full(2, np.mean(values))
+            record(ax, ends, means, found[0].drawn_name)
+            ax.axhline(means[0], ls=(0, (5, 2)), lw=1, zorder=1, **look)
+            mark_fewer(ax, ends, means, len(values), sum(group.asked for group in found), look)
     for ax, name in zip(panels, quantities, strict=True):
         if max(drawn) > _TABOR_SPAN * min(drawn):
             logarithmic_axes(ax, "x")
         _shade_unverified(ax, min(drawn))
         ax.set(xlabel=label_of("tabor_parameter"), ylabel=label_of(name))
-    panels[0].set_title(shown, loc="right")
+    panels[0].set_title(select.snapshot_label(dataset, find_snapshot(dataset, *state)), loc="right")
     legend_below(fig, looks.handles())
     return fig
 
@@ -193,6 +197,8 @@ def pull_off(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] =
         f"""Pull-off pressure against the rms slope{second} of runs that separated completely. The pull-off pressure is
         the largest nominal tension in unloading.""",
     )
+    for each in studies:
+        show_runs(fig, each, runs_with_loop(campaign[each].to_dataset(), _Y))
     for ax, x, drawn in zip(panels, ("rms_slope", "largest_reduced_pressure"), (by_slope, by_load), strict=False):
         points = {line: Points(found, x, _Y, factor=factor) for line, found in drawn.items()}
         spread = _spread([each.means[0] for each in points.values()])
@@ -311,12 +317,19 @@ def loss(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
     truths = {line: lines[line] for line in lines if looks.is_beside(line)}
     lines = {line: found for line, found in lines.items() if line not in truths} | truths
     runs = [run for group in itertools.chain(*lines.values()) for run in group.by_seed.values()]
+    several_cycles = any(int(run["leg"].max()) > 1 for run in runs)
     fig, [(left, right)] = new_panels(3.1, width_ratios=(1.25, 1))
+    for each in studies:
+        dataset = campaign[each].to_dataset()
+        show_runs(fig, each, runs_with_loop(dataset, "hysteresis_loss"), dataset["surface_energy"] > 0)
     say(
         fig,
         """Hysteresis loss of runs with adhesion, divided by the surface energy, against the largest contact area on the
-        path divided by the nominal area (a). The loss is the energy per nominal area that is dissipated on a path from
-        first contact to the largest load and back to complete separation.""",
+        path divided by the nominal area (a). The loss is the energy per nominal area that is dissipated on the whole
+        path, from first contact to complete separation.""",
+        "With turning points, this is the loss of all loadings and unloadings, inner loops included."
+        if several_cycles
+        else "",
         """With boundary elements, steps add an error of at most 0.1 % of the largest work done in loading; the error of
         the grid is larger."""
         if looks.models != [ASPERITIES_NAME]

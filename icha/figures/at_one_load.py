@@ -9,14 +9,22 @@ from matplotlib.figure import Figure
 
 from icha.analysis.model_error import state_of
 from icha.contact.attraction import FINITE_RANGE
-from icha.datasets.campaign import spots_of
+from icha.datasets.campaign import runs_with_labels, runs_with_snapshot, spots_of
 from icha.datasets.labels import slopes_of
 from icha.figures.captions import about_boundary_elements, theories_of_flat_surfaces
 from icha.figures.curves import drop_rounding_errors
-from icha.figures.drawn import plot, say
+from icha.figures.drawn import plot, say, show_runs
 from icha.figures.ensembles import draw_members, join_bins
 from icha.figures.looks import MODEL_MARKERS, REFERENCE_NAME, TRUTH_LINE, Looks, legend_below, model_handle
-from icha.figures.select import Members, NothingToDraw, has_layer, has_shape, select_snapshots, snapshot_label
+from icha.figures.select import (
+    Members,
+    NothingToDraw,
+    has_layer,
+    has_shape,
+    kind_and_target,
+    select_snapshots,
+    snapshot_label,
+)
 from icha.figures.style import BLACK, GREY, TWO_COLUMNS, in_style, logarithmic_axes, new_panels, slope_label
 from icha.references.persson import persson_pressure_density
 from icha.support.formatting import choose_unit
@@ -43,9 +51,11 @@ def _draw(ax, lines, line, look, own, true, **truth_look):
 
 def _finish(fig, panels, dataset, lines, looks, *, markers=True):
     """Add titles, legend and sentences on boundary elements."""
+    shown, model = lines[0].runs.labels, lines[0].runs.model_name
+    at_place = runs_with_labels(dataset, surface=shown.surface, rms_slope=shown.rms_slope)
+    show_runs(fig, shown.study, runs_with_snapshot(dataset, *kind_and_target(*lines[0].members[0])), at_place)
     seeds = [(len(line.members), len(line.truths)) for line in lines if line.truths]
     say(fig, about_boundary_elements((run for line in lines for run, _ in (*line.members, *line.truths)), seeds))
-    shown, model = lines[0].runs.labels, lines[0].runs.model_name
     several = {shown.surface: dataset.sizes["surface"] > 1, slope_label(shown.rms_slope): len(slopes_of(dataset)) > 1}
     place = ", ".join(words for words, needed in several.items() if needed)
     panels[-1].set_title(place, loc="right")

@@ -74,12 +74,15 @@ def grid_of_loops(campaign: xr.DataTree, studies: Sequence[str]) -> str:
 
 
 def count_runs(
-    data: Mapping[str, object], studies: Sequence[str], models: Collection[str] = (), *, of_loss: bool = False
+    data: Mapping[str, object],
+    studies: Sequence[str],
+    models: Collection[str] = (),
+    shown: Mapping[str, tuple[xr.DataArray, xr.DataArray | None]] = {},
 ) -> str:
     """Count the runs that a figure leaves out or draws pale, in sentences for the end of its caption; often empty.
 
     `data` are the datasets of the figure by name, `studies` and `models` the names of what it shows; no models if they
-    are not known. `of_loss` is True if it shows losses, which runs that failed checks of their loss do not have.
+    are not known. `shown` has, by study, the runs that the figure shows and those that it should show (`show_runs`).
     """
     found: list[str] = []
     for name in studies:
@@ -88,17 +91,20 @@ def count_runs(
         if name not in getattr(data.get("campaign"), "children", ()):
             continue
         study, suffix = data["campaign"][name].to_dataset(), f" in study {name}" if len(studies) > 1 else ""
-        left_out = left_out_of_study(study, of_loss=of_loss)
+        masks = shown.get(name, (None, None))
+        left_out = left_out_of_study(study, *masks)
         if left_out.words:
             biased = "; the others are a biased selection" if left_out.biased else ""
             found.append(
                 f"The figure shows {left_out.words}{suffix}{biased}. Means over too few of the requested seeds have no "
                 "intervals. The report lists the reasons."
             )
-        found += [f"Without a curve{suffix}: {each}." for each in absent_materials(study)]
-        shown = study["status"].isin(LOADED_RUNS)
-        shown &= study["model"].isin(list(models)) if models else True
-        reasons = study["applicability"].where(shown, "").values.ravel()
+        found += [f"Without a curve{suffix}: {each}." for each in absent_materials(study, *masks)]
+        drawn = study["status"].isin(LOADED_RUNS)
+        drawn &= study["model"].isin(list(models)) if models else True
+        for mask in masks:
+            drawn = drawn if mask is None else drawn & mask
+        reasons = study["applicability"].where(drawn, "").values.ravel()
         for reason, count in Counter(filter(None, reasons.tolist())).items():
             found.append(f"Note on {count} {'run' if count == 1 else 'runs'}{suffix}: {reason}.")
     return " ".join(found)

@@ -13,12 +13,13 @@ from matplotlib.ticker import MaxNLocator
 from icha.analysis.model_error import contact_of_spots, jaccard, snapshot_if_any, state_of
 from icha.contact.model import EVENT_KINDS
 from icha.contact.models import REFERENCE_MODEL
-from icha.datasets.campaign import find_snapshot
+from icha.datasets.campaign import find_snapshot, run_place, runs_with_labels, runs_with_snapshot
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of
+from icha.datasets.variables.campaign import LOADED_RUNS
 from icha.figures import select
 from icha.figures.captions import attractions_of, grid_of_loops, range_of_attraction
-from icha.figures.drawn import Name, plot, record, say
+from icha.figures.drawn import Name, plot, record, say, show_runs
 from icha.figures.looks import BRANCH_DASHES, REFERENCE_NAME, graded_colours, legend_below, run_label, some_of
 from icha.figures.maps import (
     average_blocks,
@@ -89,7 +90,7 @@ def contact_map(
     itself with boundary elements is drawn alone.
     """
     labels = RunLabels(*run)
-    data, alone = select.select_complete_run(campaign, labels), labels.model == REFERENCE_MODEL
+    data, alone = select.select_complete_run(campaign, labels, LOADED_RUNS), labels.model == REFERENCE_MODEL
     at = find_snapshot(data, kind, target)
     state, beside = state_of(data, at), None
     kind, target = str(data["snapshot_kind"].values[at]), float(data["snapshot_target"].values[at])
@@ -101,7 +102,7 @@ def contact_map(
     corner, width = _view(circles, topography)
     compared = beside is not None and not alone
     fig, panels = new_panels(*(6.9, 2) if compared else (3.35, 1))
-    say(fig, _CELLS if alone else _SPOTS)
+    say(fig, _CELLS if alone else _SPOTS, select.early_end(data))
     whole, enlarged = panels[0, 0], panels[1, 0] if compared else panels[0, 1]
     heights = {"cmap": "cividis", "vmin": topography.lowest, "vmax": topography.highest}
     image = topography.draw(whole, **heights)
@@ -189,6 +190,9 @@ def _window(nodes, side, corner, width):
 
 # --- figure 6 ---
 
+# Quantities that all slopes have in common, in each panel.
+_SAME = ("relative_load", "area_fraction")
+
 
 @in_style
 def spots_by_slope(
@@ -201,6 +205,11 @@ def spots_by_slope(
 ) -> Figure:
     """Draw the spots of all slopes for one surface, seed and material; the defaults are those of the first run."""
     runs = select.select_by_labels(select.select_runs(campaign, study), surface=surface, seed=seed, material=material)
+    dataset, shown = campaign[study].to_dataset(), runs[0][0]
+    reached = runs_with_snapshot(dataset, _SAME[0]) & runs_with_snapshot(dataset, _SAME[1])
+    runs = [(labels, run) for labels, run in runs if reached[run_place(dataset, labels)]]
+    if not runs:
+        raise select.NothingToDraw(f"study {study}: no run reaches both a relative load and an area fraction")
     runs = sorted(runs, key=lambda each: -each[0].rms_slope)
     # Slopes have colours from dark to bright, because the other colours stand for materials.
     colours = graded_colours(len(runs))
@@ -215,7 +224,9 @@ def spots_by_slope(
         sector of each circle in panel (b).""",
     )
     length, unit = choose_unit(float(runs[0][1]["period"]), "m")
-    for ax, kind in zip(panels, ("relative_load", "area_fraction"), strict=True):
+    of_labels = runs_with_labels(dataset, surface=shown.surface, seed=shown.seed, material=shown.material)
+    show_runs(fig, study, reached, of_labels & (dataset["model"] == shown.model))
+    for ax, kind in zip(panels, _SAME, strict=True):
         _draw_slopes(ax, runs, kind, colours, length)
         ax.set(aspect="equal", xlabel=f"$x$ ({unit})")
     panels[0].set_ylabel(f"$y$ ({unit})")
@@ -357,7 +368,7 @@ the contact area, to which cells at the edges contribute in part."""
 def pressure_maps(campaign: xr.DataTree, maps: xr.Dataset, *, run: Sequence) -> Figure:
     """Draw the pressure at the snapshots of a run; with more than six snapshots, at six of them."""
     labels = RunLabels(*run)
-    select.select_complete_run(campaign, labels)
+    data = select.select_complete_run(campaign, labels, LOADED_RUNS)
     touching = maps["contact_map"].transpose("snapshot", "row", "column").values > 0
     if not touching.any():
         raise select.NothingToDraw(f"{labels}: no snapshot has contact")
@@ -374,7 +385,7 @@ def pressure_maps(campaign: xr.DataTree, maps: xr.Dataset, *, run: Sequence) -> 
     side = float(maps["period"]) * length
     labels_of_axes = {f"{axis}label": f"${axis}$ ({length_unit})" for axis in "xy"}
     fig, panels = new_grid(len(shown), 3, 2.7, 2.15, room=(0.65, 0.1), **labels_of_axes, sharex=True, sharey=True)
-    say(fig, _PRESSURES)
+    say(fig, _PRESSURES, select.early_end(data))
     window = (0.0, 1.0)
     if str(maps["boundary"].values) == "free":  # only the region of contact
         touched = touching.any(axis=0)

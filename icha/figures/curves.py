@@ -243,8 +243,7 @@ def _draw_line(axes, line, panel, count):
     # A single run, or several runs without a mean, because these runs have no load in common.
     for (load, values), (labels, _) in zip(members, line.runs.members, strict=True):
         plot(axes, load, values, Name(line.runs.model_name, labels), **line.look)
-        if len(members) < asked:
-            mark_fewer(axes, load, values, np.isfinite(values)[None], line.look, asked)
+        mark_fewer(axes, load, values, len(members), asked, line.look)
     return tuple(map(np.concatenate, zip(*members, strict=True)))
 
 
@@ -266,7 +265,7 @@ def _draw_unloading(axes, line, panel):
         # Loads just before separation are arbitrarily small, so the line must not affect the limits of the axes.
         axes.add_artist(legend_handle(load, values, color=line.look["mec"], **_UNLOADING))
         axes.plot([], [], color=GREY, label="unloading", **_UNLOADING)
-        say(axes, "Thin dashed lines show unloading at compressive loads, for every seed.")
+        say(axes, "Thin dashed lines show unloading at compressive loads, for every seed that reaches it.")
 
 
 def draw_theory(

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -66,6 +67,20 @@ def record(axes: Axes, x: Any, y: Any, name: Name | str, **columns: Any) -> None
     labels = {} if name.labels is None else {label: getattr(name.labels, label) for label in LABELS}
     figure = axes.get_figure()
     figure.__dict__.setdefault("recorded", []).append((axes, {"curve": name.curve, "x": x, "y": y} | labels | columns))
+
+
+def show_runs(owner: Artist, study: str, shown: xr.DataArray, wanted: xr.DataArray | None = None) -> None:
+    """Record which runs of a study a figure shows, because they reach its states; the caption counts the others.
+
+    The arrays have the labels of the runs and are True for the runs that are `shown`, and for those that the figure
+    should show (`wanted`; None for all runs).
+    """
+    owner.figure.__dict__.setdefault("shown_runs", {})[study] = shown, wanted
+
+
+def shown_runs(figure: Figure) -> dict[str, tuple[xr.DataArray, xr.DataArray | None]]:
+    """Return the runs that a figure shows and those that it should show, by study."""
+    return getattr(figure, "shown_runs", {})
 
 
 def models_of(figure: Figure) -> set[str]:

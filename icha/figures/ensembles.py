@@ -72,7 +72,7 @@ def draw_members(
     record(axes, x, mean, name, low=ends[0], high=ends[1], seeds=known.sum(axis=0))
     every = max(1, -(-len(x) // _MEAN_MARKERS))
     axes.plot(*_break_lines(known, x, mean), **{"lw": 0.9, "markevery": every} | look | {"ls": ls})
-    mark_fewer(axes, x, mean, known, look, asked, every)
+    mark_fewer(axes, x, mean, known.sum(axis=0), asked, look, every)
     return members if scattered else mean[None]
 
 
@@ -83,15 +83,20 @@ def _break_lines(known, *rows):
 
 
 def mark_fewer(
-    axes: Axes, x: np.ndarray, y: np.ndarray, known: np.ndarray, look: dict, asked: int | np.ndarray, every: int = 1
+    axes: Axes,
+    x: np.ndarray,
+    y: np.ndarray,
+    counts: int | np.ndarray,
+    asked: int | np.ndarray,
+    look: dict,
+    every: int = 1,
 ) -> None:
     """Draw a cross over each marker of a mean `y` over fewer members than `asked`; arguments as of `draw_members`.
 
-    `known` is True where a member has a value; `every` is the number of points from one marker to the next.
+    `counts` are the numbers of members; `every` is the number of points from one marker to the next.
     """
-    counts = known.sum(axis=0)
-    fewer = (counts > 0) & (counts < asked)
-    if fewer.any():
+    fewer = np.greater(counts, 0) & np.less(counts, asked)
+    if np.any(fewer):
         mark = {"color": look["color"], "ms": look.get("ms", 5) + 4, "zorder": look.get("zorder", 2) + 0.2}
         axes.plot(x, np.where(fewer, y, np.nan), markevery=every, **mark, **_CROSS)
 
@@ -182,7 +187,7 @@ def draw_points(
     *points, below, above = _break_lines(known, x, over.mean, *bars)
     bars = {"yerr": [below, above] if several.any() else None, "elinewidth": 0.6, "capsize": 1.5}
     handle = axes.errorbar(*points, **bars | look)
-    mark_fewer(axes, x, over.mean, known, look, asked)
+    mark_fewer(axes, x, over.mean, over.count, asked, look)
     return handle
 
 

@@ -6,11 +6,12 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from icha.datasets.campaign import runs_with_all_loads
 from icha.datasets.labels import RunLabels, place_of, surfaces_and_slopes
 from icha.datasets.quantities import label_of, quantity
 from icha.datasets.variables.campaign import NOT_IN_DESIGN
 from icha.figures.captions import range_of_attraction
-from icha.figures.drawn import Name, say
+from icha.figures.drawn import Name, say, show_runs
 from icha.figures.ensembles import draw_points
 from icha.figures.looks import Looks, legend_below
 from icha.figures.select import NOT_APPLICABLE, Line, NothingToDraw
@@ -57,6 +58,7 @@ def _draw_errors(campaign, model_error, study, names, words):
     rows = [[material] for material in looks.materials] if own_rows else [looks.materials]
     fig, panels = new_panels(0.55 + 2.35 * len(rows), len(rows), len(names), sharex=True, sharey="col")
     say(fig, words)
+    show_runs(fig, study, runs_with_all_loads(campaign[study].to_dataset()))
     named: dict[str, object] = {}
     for row, shown in zip(panels, rows, strict=True):
         drawn = {line: errors for line, errors in curves.items() if line.material in shown}

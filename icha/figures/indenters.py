@@ -9,10 +9,12 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from icha.contact.models import REFERENCE_MODEL
+from icha.datasets.campaign import runs_with_unloading, whole_runs
 from icha.datasets.quantities import label_of
 from icha.figures import select
 from icha.figures.curves import panel_in_units
-from icha.figures.drawn import Name, plot, record, say
+from icha.figures.drawn import Name, plot, record, say, show_runs
+from icha.figures.ensembles import mark_fewer
 from icha.figures.looks import BRANCH_DASHES, distinct_colours, graded_colours, legend_below
 from icha.figures.measured import Measured, name_sources
 from icha.figures.style import (
@@ -65,7 +67,8 @@ def select_series(campaign: xr.DataTree, study: str, *, only_jkr: bool = False) 
     """Return the series of a study on free squares that unload, by increasing rms height.
 
     If the study has boundary elements, the series are those of boundary elements. `only_jkr` leaves out runs without
-    adhesion, without a radius, and on layers. Raise `NothingToDraw` if no run is left.
+    adhesion, without a radius, on layers, and those that ended before their last target. Raise `NothingToDraw` if no
+    run is left.
     """
     # Only boundary elements compute shapes; both models compute free squares without a shape.
     unloaded = select.select_unloaded_runs(campaign, study, REFERENCE_MODEL)
@@ -77,6 +80,9 @@ def select_series(campaign: xr.DataTree, study: str, *, only_jkr: bool = False) 
         if not runs:
             expected = "the figure needs a radius and a surface energy"
             raise select.NothingToDraw(f"study {study}: no sphere with adhesion; {expected}")
+        runs = [(labels, run) for labels, run in runs if not select.early_end(run)]
+        if not runs:
+            raise select.NothingToDraw(f"study {study}: no sphere with adhesion reached the end of its path")
     groups = sorted(select.group_by_contact(campaign, runs), key=_roughness)
     several = len({group.labels.material for group in groups}) > 1
     # The rms height tells surfaces apart if they have the same shape and different heights.
@@ -95,6 +101,16 @@ def select_series(campaign: xr.DataTree, study: str, *, only_jkr: bool = False) 
         colour = distinct[k] if named or several else palette.get(height, BLACK)
         found.append(Series(group, ", ".join([*surface, words, *material]), ", ".join(surface + material), colour))
     return found
+
+
+def _show_runs(figure, campaign, series, *, only_jkr=False):
+    """Record the runs of some series, and those of the study that should be in a series; arguments as above."""
+    labels = series[0].runs.labels
+    study = campaign[labels.study].to_dataset()
+    wanted = study["model"] == labels.model
+    if only_jkr:
+        wanted = wanted & (study["surface_energy"] > 0)
+    show_runs(figure, labels.study, whole_runs(study) if only_jkr else runs_with_unloading(study), wanted)
 
 
 def _roughness(group):
@@ -129,8 +145,8 @@ _THEORIES = {
     "Hertz": {"color": GREY, "lw": 0.9, "ls": ":"},
 }
 _INDENTATION = """Force against indentation. The indentation is the distance by which the apex of the shape without
-roughness has moved beyond the undeformed plane of the elastic body. Tension is negative. Every seed is a line of its
-own."""
+roughness has moved beyond the undeformed plane of the elastic body. Tension is negative. Every seed that
+reaches its unloading is a line of its own."""
 _SPHERES = """The theories of Hertz, and of Johnson, Kendall and Roberts (JKR), are for a smooth sphere with the radius,
 the modulus and the works of adhesion of the runs in the same panel. The line of JKR includes states that are unstable
 under load control, up to the jump-off under displacement control. Runs without adhesion have no line of JKR; shapes
@@ -154,6 +170,7 @@ def force_indentation(campaign: xr.DataTree, *, study: str, measurements: Sequen
     labels = {f"{axis}label": label_of(name, unit) for axis, name, unit in zip("xy", names, panel.units, strict=True)}
     fig, panels = new_grid(len(shown), 2, 2.7, 3.55, least=1.3, **labels, sharex=True, sharey=True)
     say(fig, _INDENTATION)
+    _show_runs(fig, campaign, series)
     measured = _select_measured(fig, measurements, *names)
     points = map(panel.points, [*runs, *(each.values for each, _ in measured)])
     limits = [limits_around(np.concatenate(values)) for values in zip(*points, strict=True)]
@@ -221,10 +238,11 @@ _LINE = """Linearised plot of the equation of Johnson, Kendall and Roberts (JKR)
 last unloading up to the largest tension (b). Here F is the force, R the radius of the smooth sphere, and a the radius
 of a circle with the true contact area. A smooth sphere with a Tabor parameter of 3 or more gives a straight line of
 slope 3/(4 E*), and the work of adhesion w follows from the value at F = 0, 3 sqrt(8 π E* w)/(4 E*). Markers are states
-of all seeds, at most one hundred of each run at equal steps of the indentation. States with F/a^(3/2) below -sqrt(8 π
+of the runs, at most one hundred of each run at equal steps of the indentation. States with F/a^(3/2) below -sqrt(8 π
 E* Δγ), where no sphere of JKR has contact (Δγ of receding edges), are not shown; in unloading with two works of
 adhesion, neither are states whose edge stands. A fit minimises the squared differences of a³ at given F, with the given
-E* and R, so states with a large radius have most weight. The legend gives means over the seeds."""
+E* and R, so states with a large radius have most weight. The legend gives means over the seeds, with the
+number of seeds if it is smaller than requested."""
 
 
 @in_style
@@ -251,6 +269,7 @@ def jkr_plot(campaign: xr.DataTree, *, study: str, measurements: Sequence[Measur
     scale, unit = choose_unit(max(float(np.abs(x).max(initial=0.0)) for *_, x, _ in drawn), "N")
     fig, [panels] = new_panels(3.0, sharex=True, sharey=True)
     say(fig, _LINE, _FITS, _radius_of_paraboloids(series))
+    _show_runs(fig, campaign, series, only_jkr=True)
     for branch, each, labels, run, x, y in drawn:
         ax = panels[list(_TITLES).index(branch)]
         plot(ax, x * scale, y * 1e3, Name("states", labels), marker=_TITLES[branch][1], mec=each.colour, **_STATES)
@@ -288,7 +307,8 @@ def _works(series):
         name = f"work_of_adhesion_{branch}"
         values = [float(run[name]) for run in runs if name in run]
         if values:
-            fewer = f" ({len(values)} of {len(runs)} seeds)" if len(values) < len(runs) else ""
+            asked = series.runs.asked
+            fewer = f" ({len(values)} of {asked} seeds)" if len(values) < asked else ""
             words.append(f"{title} {format_quantity(float(f'{np.mean(values):.3g}'), 'J/m²')}{fewer}")
         else:
             words.append(f"{title} no fit ({reason_without_fit(runs[0], branch)})")
@@ -336,10 +356,11 @@ def work_of_adhesion(campaign: xr.DataTree, *, study: str, measurements: Sequenc
     fig = new_figure(1.25 * ONE_COLUMN, 2.9)
     ax = fig.subplots()
     say(fig, _WORK, _FITS)
+    _show_runs(fig, campaign, series, only_jkr=True)
     handles = {name: legend_handle(color=colour, lw=4) for name, colour in colours.items() if name}
     for (quantity, (name, marker, own, unit_of_work)), contact in itertools.product(_WORKS.items(), contacts):
         # Colours distinguish the quantities, or surfaces and materials if there are several.
-        colour, means = colours[contact] if contact else own, []
+        colour, means, counts = colours[contact] if contact else own, [], []
         for group in (each.runs for each in series if each.contact == contact):
             points = []
             for labels, run in group.members:
@@ -350,10 +371,12 @@ def work_of_adhesion(campaign: xr.DataTree, *, study: str, measurements: Sequenc
             if points:
                 ax.plot(*np.transpose(points), marker=marker, mec=colour, **_ONE_SEED)
                 means.append(np.mean(points, axis=0))
+                counts.append((len(points), group.asked))
                 of_mean = Name(f"{name}, mean", group.labels._replace(seed=None))
                 record(ax, *np.transpose(means[-1:]), of_mean, seeds=len(points))
         if means:
             ax.plot(*np.transpose(means), marker=marker, color=colour, **_MEAN)
+            mark_fewer(ax, *np.transpose(means), *np.transpose(counts), {"color": colour, **_MEAN})
             handles[name] = legend_handle(color=GREY if contact else colour, marker=marker, **_MEAN)
     markers = itertools.cycle(_CROSSES)
     for each, look in _select_measured(fig, measurements, "rms_height"):

@@ -8,11 +8,12 @@ from matplotlib.ticker import MaxNLocator
 from icha.analysis.model_error import difference_of_contacts
 from icha.contact.model import EVENT_KINDS
 from icha.contact.models import MODELS, REFERENCE_MODEL
+from icha.datasets.campaign import runs_with_labels, runs_with_unloading
 from icha.datasets.quantities import symbol_of
 from icha.figures import select
 from icha.figures.captions import attractions_of, grid_of_loops, range_of_attraction
 from icha.figures.curves import Panel, panel_in_units
-from icha.figures.drawn import Name, plot, record, say
+from icha.figures.drawn import Name, plot, record, say, show_runs
 from icha.figures.looks import BRANCH_DASHES, MODEL_MARKERS, UNLOADING_MARKERS, Looks, legend_below, pale, surface_label
 from icha.figures.style import GREY, format_number, in_style, legend_handle, limits_around, new_panels, slope_label
 
@@ -69,12 +70,16 @@ def loops(
 
     # A smooth shape has no roughness, whose height and slope are the reduced units.
     physical = units == "physical" or not any(float(run["rms_height"]) for _, run in runs)
-    pressures, areas = _panels(campaign[study].to_dataset(), physical=physical)
+    dataset = campaign[study].to_dataset()
+    pressures, areas = _panels(dataset, physical=physical)
     rows = [[slope] for slope in slopes] if own_rows else [slopes]
     by_row = [[loop for loop in drawn if loop[0].rms_slope in shown] for shown in rows]
     windows = [_small_tensions(loops_of_row, pressures) for loops_of_row in by_row]
     columns = 3 if any(windows) else 2
     fig, panels = new_panels(2.7 * len(rows), len(rows), columns)
+    labels, _ = runs[0]
+    topography = runs_with_labels(dataset, surface=labels.surface, seed=labels.seed)
+    show_runs(fig, study, runs_with_unloading(dataset), topography)
     say(fig, _LOOPS if physical else f"{_LOOPS} In reduced units, that energy is divided by E* h'rms h_rms.")
     for (left, *middle, right), shown_loops, window in zip(panels, by_row, windows, strict=True):
         for ax, panel in ((left, pressures), *((ax, pressures) for ax in middle), (right, areas)):
@@ -91,7 +96,6 @@ def loops(
             ax.set_ylabel(symbol_of(pressures.y) + (f" ({pressures.units[1]})" if physical else ""))
         if own_rows:
             right.set_title(slope_label(shown_loops[0][0].rms_slope), loc="right")
-    labels, _ = runs[0]
     models = dict.fromkeys([labels.model, *(REFERENCE_MODEL for _, _, beside, _ in drawn if beside)])
     title = " and ".join(MODELS[model].words for model in models)
     words = title, surface_label(campaign, labels.surface), f"seed {labels.seed}"

@@ -63,7 +63,7 @@ def draw_figure(
     from icha.datasets.campaign import NoSnapshot
     from icha.datasets.table import as_csv
     from icha.figures.captions import count_runs, units_of_shapes
-    from icha.figures.drawn import caption_of, models_of, say, table_of
+    from icha.figures.drawn import caption_of, models_of, say, shown_runs, table_of
     from icha.figures.measured import read_measurements
     from icha.figures.select import NothingToDraw
     from icha.figures.style import empty_page, save
@@ -86,8 +86,7 @@ def draw_figure(
     with whole_file(table) as temporary:
         temporary.write_text(as_csv(table_of(figure)), encoding="utf-8")
     with whole_file(text) as temporary:
-        of_loss = any("loss" in axes.get_ylabel() for axes in figure.axes)
-        counts = count_runs(data, studies, models_of(figure), of_loss=of_loss)
+        counts = count_runs(data, studies, models_of(figure), shown_runs(figure))
         temporary.write_text(f"{caption} {counts}".strip() + "\n", encoding="utf-8")
 
 

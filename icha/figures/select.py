@@ -1,6 +1,6 @@
 """Select runs, snapshots and errors for a figure from the datasets of a campaign."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -9,7 +9,7 @@ import xarray as xr
 from icha.analysis.model_error import snapshot_if_any
 from icha.contact.attraction import FINITE_RANGE
 from icha.contact.models import DEFAULT_MODEL, MODELS, REFERENCE_MODEL, first_model, model_of
-from icha.datasets.campaign import loading_stops, reduced_gap, run_place, runs_of_status, select_run
+from icha.datasets.campaign import find_snapshot, loading_stops, reduced_gap, run_place, runs_of_status, select_run
 from icha.datasets.labels import LABELS, RunLabels, place_of
 from icha.datasets.quantities import quantity
 from icha.datasets.variables.campaign import COMPUTED_RUNS, LOADED_RUNS, MISSING, RAGGED, WHOLE_RUNS
@@ -209,12 +209,18 @@ def select_by_labels(runs: LabelledRuns, **wanted: object) -> LabelledRuns:
     return runs
 
 
-def select_complete_run(campaign: xr.DataTree, labels: RunLabels) -> xr.Dataset:
-    """Return a run of the campaign; raise `NothingToDraw` if the run is not complete."""
+def select_complete_run(campaign: xr.DataTree, labels: RunLabels, statuses: Collection[int] = WHOLE_RUNS) -> xr.Dataset:
+    """Return a run of the campaign; raise `NothingToDraw` if its status is not one of `statuses`."""
     dataset = campaign[labels.study].to_dataset()
-    if int(dataset["status"].isel(run_place(dataset, labels))) not in WHOLE_RUNS:
+    if int(dataset["status"].isel(run_place(dataset, labels))) not in statuses:
         raise NothingToDraw(f"{labels}: this run is not complete")
     return select_run(campaign, labels)
+
+
+def early_end(run: xr.Dataset) -> str:
+    """Return a sentence on the end of a run before its last target; "" if the run reached its last target."""
+    reason = run.attrs.get("beyond_model")
+    return f"The run ended before its last target: {reason}." if reason else ""
 
 
 def path_steps(run: xr.Dataset) -> xr.Dataset:
@@ -271,23 +277,28 @@ def select_snapshots(
     Runs that do not reach the state are left out.
     """
     groups = group_by_contact(campaign, select_runs(campaign, study))
+    dataset = campaign[study].to_dataset()
+    state = kind_and_target(dataset, find_snapshot(dataset, kind, target))
     alone = groups[0].labels.model == REFERENCE_MODEL
     others = [] if alone else select_runs(campaign, study, model=REFERENCE_MODEL)
     found = []
     for group in groups:
         if group.line.place == groups[0].line.place:
-            members = [(run, snapshot_if_any(run, kind, target)) for run in group.by_seed.values()]
+            members = [(run, snapshot_if_any(run, *state)) for run in group.by_seed.values()]
             members = [member for member in members if member[1] is not None]
             if not members:
                 continue
-            run, at = members[0]
-            state = str(run["snapshot_kind"].values[at]), float(run["snapshot_target"].values[at])
             beside = [run for labels, run in others if Line.of(labels).contact == group.line.contact]
             truths = [(truth, snapshot_if_any(truth, *state)) for truth in beside]
             found.append(Snapshots(group, members, [truth for truth in truths if truth[1] is not None]))
     if not found:
         raise NothingToDraw(f"study {study}: no run reaches the state of the snapshot")
     return found
+
+
+def kind_and_target(data: xr.Dataset, snapshot: int) -> tuple[str, float]:
+    """Return kind and target of a snapshot of a study or run."""
+    return str(data["snapshot_kind"].values[snapshot]), float(data["snapshot_target"].values[snapshot])
 
 
 def snapshot_label(run: xr.Dataset, snapshot: int) -> str:

@@ -14,7 +14,7 @@ from markupsafe import Markup
 from icha.analysis.checks import worst
 from icha.checks.findings import Check
 from icha.contact.models import MODELS
-from icha.datasets.campaign import run_place, runs_of_status
+from icha.datasets.campaign import run_place, runs_of_status, runs_with_loop
 from icha.datasets.labels import RunLabels, slopes_of
 from icha.datasets.quantities import quantity
 from icha.datasets.surface_file import measured_scale
@@ -86,7 +86,7 @@ def failures(studies: Mapping[str, xr.Dataset], folder: str | None) -> tuple[lis
     sentences = [
         f"Study {name}: {words}."
         for name, study in studies.items()
-        if (words := left_out_of_study(study, of_loss=True).words)
+        if (words := left_out_of_study(study, *_runs_with_loss(study)).words)
     ]
     rows = []
     for name, study in studies.items():
@@ -99,6 +99,13 @@ def failures(studies: Mapping[str, xr.Dataset], folder: str | None) -> tuple[lis
             if (reason := _reason(study, "applicability", run))
         ]
     return sentences, Table("Runs that are not part of means", ("run", "", "reason"), rows)
+
+
+def _runs_with_loss(study):
+    """Return which runs of a study have a loss, and which should have one; nothing if the study has no losses."""
+    if "hysteresis_loss" not in study:
+        return ()
+    return runs_with_loop(study, "hysteresis_loss"), study["surface_energy"] > 0
 
 
 def _run(run: RunLabels, folder: str | None = None) -> str:

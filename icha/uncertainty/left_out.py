@@ -182,19 +182,39 @@ def causes_of_runs(runs: xr.Dataset, values: xr.DataArray | None = None, *, of_l
     return causes.where(status != NOT_IN_DESIGN, NOT_REQUESTED)
 
 
-def left_out_of_study(study: xr.Dataset, *, of_loss: bool = False) -> LeftOut:
-    """Describe the runs of a study that failed or are missing; if `of_loss`, those with adhesion that have no loss."""
-    causes = causes_of_runs(study, of_loss=of_loss)
-    if of_loss and "hysteresis_loss" in study:
-        causes = causes.where((causes != "") | study["hysteresis_loss"].notnull(), ENDED_EARLY)
-        causes = causes.where(study["surface_energy"] > 0, NOT_REQUESTED)
-    causes = causes.transpose(*LABELS).values.ravel()
+def left_out_of_study(
+    study: xr.Dataset, shown: xr.DataArray | None = None, wanted: xr.DataArray | None = None
+) -> LeftOut:
+    """Describe the runs of a study that failed, are missing, or ended before a state.
+
+    Parameters
+    ----------
+    study : study of a campaign dataset.
+    shown : True for the runs that reach the state (`icha.datasets.campaign`). A run that reached the end of its path
+        and is not shown failed a check of its loss. None: the state is the first target.
+    wanted : True for the runs that count; None for all runs.
+    """
+    causes = _causes_at_state(study, shown, wanted).transpose(*LABELS).values.ravel()
     return find_left_out("runs", causes, varied_parameters(study, LABELS))
 
 
-def absent_materials(study: xr.Dataset) -> list[str]:
-    """Describe each model and material of a study whose runs all are left out, with causes and one reason."""
-    causes, found = causes_of_runs(study), []
+def _causes_at_state(study, shown, wanted):
+    """Return the causes of `causes_of_runs` at the state of `left_out_of_study`."""
+    causes = causes_of_runs(study)
+    if shown is not None:
+        causes = causes.where((causes != "") | shown | (study["status"] != FAILED_LOSS), LOSS_FAILED)
+        causes = causes.where((causes != "") | shown, ENDED_EARLY)
+    return causes if wanted is None else causes.where(wanted, NOT_REQUESTED)
+
+
+def absent_materials(
+    study: xr.Dataset, shown: xr.DataArray | None = None, wanted: xr.DataArray | None = None
+) -> list[str]:
+    """Describe each model and material of a study whose runs all are left out, with causes and one reason.
+
+    Parameters are those of `left_out_of_study`.
+    """
+    causes, found = _causes_at_state(study, shown, wanted), []
     for model, material in itertools.product(study["model"].values, study["material"].values):
         at = {"model": study["model"].values == model, "material": study["material"].values == material}
         left_out = find_left_out("runs", causes.isel(at).values.ravel())

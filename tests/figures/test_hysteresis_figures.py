@@ -17,6 +17,7 @@ from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of
 from icha.figures import against_parameter, contact_maps, loops
 from icha.figures.against_parameter import fit_line, shares
+from icha.figures.drawn import caption_of
 from icha.figures.ensembles import Points
 from icha.figures.select import ContactRuns, select_unloaded_runs
 
@@ -345,6 +346,9 @@ def test_figures_of_several_cycles_show_the_first_loading_and_the_last_unloading
     assert formed > broke > 0
     names = legend(snap_map(tree, surface))
     assert {f"spot formed ({formed})", f"spot broken ({broke})"} <= set(names)
+    words = "this is the loss of all loadings and unloadings, inner loops included"
+    assert words in caption_of(draw(against_parameter.loss, tree, "one"))
+    assert words not in caption_of(draw(against_parameter.loss, one(), "one"))
 
 
 def test_boundary_elements_are_drawn_where_no_run_with_asperities_unloads():

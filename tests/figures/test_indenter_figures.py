@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from drawn import legend
 from typer.testing import CliRunner
 
 import icha
@@ -15,9 +16,11 @@ from icha.datasets.files import read_dataset, write_dataset
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of
 from icha.datasets.surface_file import write_surface
+from icha.datasets.variables.run import LOOP
 from icha.figures import against_load, at_one_load, contact_maps, indenters, loops, select
-from icha.figures.captions import units_of_shapes
-from icha.figures.drawn import caption_of, table_of
+from icha.figures.captions import count_runs, units_of_shapes
+from icha.figures.drawn import caption_of, shown_runs, table_of
+from icha.figures.looks import FEWER_SEEDS
 from icha.figures.measured import read_measurements
 from icha.surfaces.shapes import Cone, CylinderPunch, Paraboloid, Sphere
 
@@ -284,3 +287,41 @@ def test_reasons_for_an_empty_figure():
     assert len(lines(indenters.force_indentation(cone, study="press").axes[0])) == 3  # both legs, and zero force
     with pytest.raises(select.NothingToDraw, match="no sphere with adhesion"):
         indenters.jkr_plot(cone, study="press")
+
+
+def ended_seeds():
+    """Return the dataset of three seeds of nearly equal roughness; the second seed ended before its unloading."""
+    runs = [press(rms=1e-8), press(rms=1.00001e-8), press(rms=1.00002e-8)]
+    first = runs[1].isel(step=runs[1]["leg"].values == 0, snapshot=[0])
+    first = first.isel(spot=first["spot_snapshot"].values == 0, event=first["event_step"].values < first.sizes["step"])
+    lost = [name for name in first if name in LOOP or name.startswith(("pull_off", "work_of", "loss"))]
+    runs[1] = first.drop_vars(lost).assign_attrs(beyond_model="contact at the edge")
+    labels = [RunLabels("press", "boundary_elements", "s0", seed, 0.1, "soft") for seed in (1, 2, 3)]
+    return campaign_tree(zip(labels, runs, strict=True)), labels
+
+
+def test_seeds_that_ended_before_their_unloading_are_counted_and_means_of_the_others_are_marked():
+    tree, _ = ended_seeds()
+    drawn = [module(tree, study="press") for module in FIGURES]
+    for figure in drawn:
+        caption = count_runs({"campaign": tree}, ["press"], shown=shown_runs(figure))
+        assert caption.startswith("The figure shows 2 of 3 runs; 1 ended before this state; the others are a biased")
+    assert legend(drawn[1])[0].count("(2 of 3 seeds)") == 2
+    assert FEWER_SEEDS in legend(drawn[2])
+    crosses = [line for line in drawn[2].axes[0].get_lines() if line.get_marker() == "x"]
+    assert len(crosses) == 3
+
+
+def test_axes_have_no_offset():
+    tree, _ = ended_seeds()
+    (axes,) = indenters.work_of_adhesion(tree, study="press").axes
+    axes.figure.draw_without_rendering()
+    assert axes.xaxis.get_offset_text().get_text() == ""
+
+
+def test_maps_show_the_snapshots_that_a_run_reached_before_its_end():
+    tree, labels = ended_seeds()
+    run = press(rms=1.00001e-8).isel(snapshot=[0])
+    figure = contact_maps.pressure_maps(tree, run, run=labels[1])
+    assert len([ax for ax in figure.axes if ax.get_images()]) == 1
+    assert "The run ended before its last target: contact at the edge." in caption_of(figure)

@@ -1,23 +1,31 @@
 """Figures of means over fewer seeds than requested show it, and captions count the missing runs."""
 
+import warnings
+
+import compared_campaign as compared
 import cyclic_campaign as cyclic
 import numpy as np
 import pytest
 import small_campaign as small
+import xarray as xr
 from drawn import draw, legend, lines_of
 
+from icha.analysis.model_error import model_error
 from icha.contact.attraction import SHORT_RANGE
+from icha.datasets.campaign import NoSnapshot
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import RunLabels
-from icha.figures import against_load, against_parameter, contact_maps, loops
+from icha.datasets.variables.run import LOOP
+from icha.figures import against_load, against_parameter, at_one_load, contact_maps, errors, loops
 from icha.figures.captions import count_runs
-from icha.figures.drawn import Name, caption_of
+from icha.figures.drawn import Name, caption_of, shown_runs, table_of
 from icha.figures.ensembles import draw_members, draw_points
 from icha.figures.looks import FEWER_SEEDS
 from icha.figures.select import NOT_APPLICABLE
 from icha.figures.style import new_figure
 
 SEEDS = range(1, 6)
+LABELS = RunLabels("five", "asperities", "rough", 1, 1.0, "soft")
 REASON = "asperity model not applicable: 40 % of the load is on summits that no node supports"
 
 
@@ -123,3 +131,100 @@ def test_captions_name_a_material_whose_runs_ended_before_their_first_target():
     caption = count_runs({"campaign": tree}, ["slopes"])
     assert "The figure shows 1 of 2 runs; 1 ended before the first target" in caption
     assert f"Without a curve: soft with asperities (1 ended before the first target: {reason})." in caption
+
+
+# --- runs that physics ended before their last target -----------------------------------------------------------
+
+
+def ended(labels, run, step):
+    """Return a run that ended before a step, without the snapshots and the values of the loop that it did not reach."""
+    reached = np.flatnonzero(run["snapshot_step"].values < step)
+    spots = np.isin(run["spot_snapshot"].values, reached)
+    run = run.drop_vars([name for name in LOOP if name in run])
+    run = run.isel(step=slice(0, step), snapshot=reached, spot=spots)
+    if "event_step" in run:
+        run = run.isel(event=run["event_step"].values < step)
+    return labels, run.assign_attrs(beyond_model="near full contact")
+
+
+@pytest.mark.parametrize("figure", [14, 15, 3, 8, 9, 13])
+def test_captions_and_crosses_show_seeds_that_ended_before_the_state_of_a_figure(figure):
+    of_loop = figure > 9
+    runs = [(LABELS._replace(seed=seed), (cyclic.run if of_loop else small.run)(seed)) for seed in SEEDS]
+    short = [4] if of_loop else [int(run["snapshot_step"].max()) for _, run in runs]
+    runs = [ended(*each, short[k % len(short)]) if k in (1, 3) else each for k, each in enumerate(runs)]
+    tree = campaign_tree(runs)
+    module, further = {
+        3: (at_one_load.distributions, {"kind": "area_fraction"}),
+        8: (at_one_load.patch_sizes, {"kind": "area_fraction"}),
+        9: (against_parameter.tabor, {"kind": "area_fraction"}),
+        13: (loops.loops, {}),
+        14: (against_parameter.pull_off, {}),
+        15: (against_parameter.loss, {}),
+    }[figure]
+    study = {"studies": ["five"]} if figure == 15 else {"study": "five"}
+    drawn = module(tree, **study, **further)
+    caption = count_runs({"campaign": tree}, ["five"], shown=shown_runs(drawn))
+    if figure == 13:  # a figure of one seed, which is complete
+        assert caption == ""
+        return
+    assert caption.startswith("The figure shows 3 of 5 runs; 2 ended before this state; the others are a biased sel")
+    assert FEWER_SEEDS in legend(drawn)
+    whole = campaign_tree((labels, (cyclic.run if of_loop else small.run)(labels.seed)) for labels, _ in runs)
+    assert count_runs({"campaign": whole}, ["five"], shown=shown_runs(module(whole, **study, **further))) == ""
+
+
+def test_captions_name_a_material_whose_runs_all_ended_before_the_state_of_a_figure():
+    runs = [(LABELS, small.run()), (LABELS._replace(material="hertz"), small.run(material="hertz"))]
+    tree = campaign_tree([runs[0], ended(*runs[1], int(runs[1][1]["snapshot_step"].max()))])
+    figure = at_one_load.distributions(tree, study="five", kind="area_fraction")
+    caption = count_runs({"campaign": tree}, ["five"], shown=shown_runs(figure))
+    assert "Without a curve: hertz with asperities (1 ended before this state: near full contact)." in caption
+
+
+def test_spots_by_slope_leave_out_slopes_without_a_state_and_say_so():
+    runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes" and labels.material == "soft"]
+    (labels, run), other = runs
+    tree = campaign_tree([ended(labels, run, int(run["snapshot_step"].max())), other])
+    figure = contact_maps.spots_by_slope(tree, study="slopes")
+    assert len(legend(figure)) == 1
+    caption = count_runs({"campaign": tree}, ["slopes"], shown=shown_runs(figure))
+    assert caption.startswith("The figure shows 1 of 2 runs; 1 ended before this state, with rms slope above 0.9; the")
+
+
+def test_captions_of_errors_count_seeds_that_ended_before_the_largest_load():
+    truths = dict(compared.patches())
+    runs = [
+        ended(labels, run, int(run["snapshot_step"].max())) if labels.seed == 2 else (labels, run)
+        for labels, run in compared.runs().items()
+        if labels.material == "soft"
+    ]
+    tree = campaign_tree([*runs, *((labels, run) for labels, run in truths.items() if labels.material == "soft")])
+    found = model_error(tree, [(labels, run) for labels, run in truths.items() if labels.material == "soft"])
+    figure = errors.model_error(tree, found, study="one")
+    assert FEWER_SEEDS in [line.get_label() for line in figure.axes[0].get_lines()]
+    caption = count_runs({"campaign": tree}, ["one"], shown=shown_runs(figure))
+    assert caption.startswith("The figure shows 5 of 6 runs; 1 ended before this state; the others are a biased")
+
+
+def test_a_snapshot_that_a_run_reached_before_its_end_is_drawn(surface):
+    labels, run = ended(LABELS, small.run(), int(small.run()["snapshot_step"].max()))
+    figure = contact_maps.contact_map(campaign_tree([(labels, run)]), surface, run=labels, kind="relative_load")
+    assert figure.axes[0].get_images()
+    assert "The run ended before its last target: near full contact." in caption_of(figure)
+    with pytest.raises(NoSnapshot, match="no snapshot of area_fraction"):
+        contact_maps.contact_map(campaign_tree([(labels, run)]), surface, run=labels, kind="area_fraction")
+
+
+def test_fig2_draws_seeds_of_other_loads_with_a_separation_below_zero():
+    second = small.run(2)
+    second = second.isel(step=second["reduced_pressure"].values < second["reduced_pressure"].values.max())
+    last = xr.DataArray(np.arange(second.sizes["step"]) == second.sizes["step"] - 1, dims="step")
+    second["reduced_separation"] = second["reduced_separation"].where(~last, -0.01)
+    second = second.assign_attrs(beyond_model="near full contact")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        figure = against_load.area_and_gap(
+            campaign_tree([(LABELS, small.run()), (LABELS._replace(seed=2), second)]), study="five"
+        )
+    assert table_of(figure).panel.isin(["b"]).any()

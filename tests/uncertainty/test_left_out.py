@@ -13,6 +13,7 @@ from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.table import tidy_table
 from icha.figures import against_parameter, samples
 from icha.figures.captions import count_runs
+from icha.figures.drawn import shown_runs
 from icha.figures.looks import FEWER_SEEDS
 from icha.report.answers import answers_of, samples_table
 from icha.uncertainty.estimates import estimate_campaign
@@ -136,5 +137,6 @@ def test_a_failed_check_of_the_loss_leaves_pull_off_and_areas():
 def test_the_caption_of_a_figure_of_losses_counts_the_loops_without_a_loss():
     data = {"campaign": loops(gains=(2, 3))}
     assert count_runs(data, ["pull"]) == ""
-    caption = count_runs(data, ["pull"], of_loss=True)
+    figure = against_parameter.loss(data["campaign"], studies=["pull"])
+    caption = count_runs(data, ["pull"], shown=shown_runs(figure))
     assert caption.startswith("The figure shows 3 of 5 runs; 2 failed a check of the loss; the others are a biased")
