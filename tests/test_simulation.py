@@ -12,9 +12,12 @@ import pytest
 import xarray as xr
 from digests import digest
 
-from icha import ConvergenceError, IchaWarning, Material, Path, SelfAffineSpectrum, Sphere, Surface, simulate
+from icha import ConvergenceError, IchaWarning, Material, Path, SelfAffineSpectrum, Sphere, Stripes, Surface, simulate
 from icha.asperity.stickiness import stickiness
+from icha.datasets.campaign import select_run
+from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.format import RUN, problems_with_file
+from icha.datasets.labels import RunLabels
 from icha.surfaces.moments import spectral_moments
 
 PERIOD, MODULUS, ENERGY, RANGE = 100e-6, 25e6, 0.05, 2.071e-9
@@ -50,6 +53,34 @@ def test_a_pit_deeper_than_the_bins_ends_no_run(model):
     # One node is in the last bin.
     assert content[-1] == pytest.approx(1 / 64**2, rel=1e-9)
     assert not list(problems_with_file(RUN, run))
+
+
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_runs_on_layers_and_maps_say_so(boundary):
+    surface = Surface(rough(grid=32, ratio=8).heights, PERIOD, boundary)
+    map_of_two = Stripes(0.01, 0.02, PERIOD / 4)
+    materials = {
+        "half": BARE,
+        "film": Material(MODULUS, 0.0, thickness=1e-5, poisson_ratio=0.4),
+        "striped": Material(MODULUS, map_of_two),
+    }
+    labels = {name: RunLabels("one", "boundary_elements", "rough", 1, surface.rms_slope, name) for name in materials}
+    runs = {
+        labels[name]: simulate(surface, each, Path([1e-2]), model="boundary_elements", seed=1)
+        for name, each in materials.items()
+    }
+    tree = campaign_tree(runs.items())
+    for found in (runs, {each: select_run(tree, each) for each in runs}):
+        layers = [each for each, run in found.items() if {"layer_thickness", "layer_poisson_ratio"} & set(run)]
+        assert layers == [labels["film"]]
+        film = found[labels["film"]]
+        assert (film["layer_thickness"], film["layer_poisson_ratio"]) == (1e-5, 0.4)
+        assert film["layer_thickness"].attrs["units"] == "m" and film["layer_poisson_ratio"].attrs["long_name"]
+        assert found[labels["striped"]]["adhesion_map_kind"] == "stripes"
+    for each, run in runs.items():
+        assert not problems_with_file(RUN, run)
+        assert ("elastic layer on a rigid base" in run.attrs["summary"]) == (each.material == "film")
+        assert ("elastic half-space" in run.attrs["summary"]) == (each.material != "film")
 
 
 def test_spots_follow_the_jkr_law_and_checks_pass(run):

@@ -57,7 +57,7 @@ def _command(name, command):
 def run_variables() -> str:
     """Variables of the file of a run."""
     from icha.contact.models import MODELS
-    from icha.datasets.variables.run import CYCLE, FURTHER, INDENTER, LOOP, RUN
+    from icha.datasets.variables.run import ADHESION_MAP, CYCLE, FURTHER, INDENTER, LAYER, LOOP, RUN
 
     sections = {
         "All runs": RUN,
@@ -65,6 +65,8 @@ def run_variables() -> str:
         "Runs that unload": CYCLE,
         "Runs that end without contact": LOOP,
         "Runs on a free square": INDENTER,
+        "Runs on a layer": LAYER,
+        "Runs with a map of works of adhesion": ADHESION_MAP,
     }
     return "\n".join(f"### {heading}\n\n{_table(_rows(variables))}" for heading, variables in sections.items())
 
@@ -72,10 +74,10 @@ def run_variables() -> str:
 def campaign_variables() -> str:
     """Variables of a campaign dataset besides those of its runs, and the dimensions of all."""
     from icha.datasets.labels import LABELS
-    from icha.datasets.variables.run import CYCLE, INDENTER, LOOP, RUN
+    from icha.datasets.variables.run import CYCLE, LOOP, OF_SOME, RUN
 
     study = _small_campaign()["study"].to_dataset()
-    of_runs = RUN | CYCLE | LOOP | INDENTER
+    of_runs = RUN | CYCLE | LOOP | OF_SOME
     own = {name: variable for name, variable in study.variables.items() if name not in of_runs}
     shared = {
         name: ", ".join(dim for dim in study[name].dims if dim not in of_runs[name].dims) or "none"

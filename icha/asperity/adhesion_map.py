@@ -32,6 +32,7 @@ class Stripes:
     high: float
     width: float
     along: str = "x"
+    kind = "stripes"
 
     def __post_init__(self):
         """Check the values."""
@@ -79,6 +80,7 @@ class Patches:
     standard_deviation: float
     correlation_length: float
     seed: int = 0
+    kind = "patches"
 
     def __post_init__(self):
         """Check the values."""
@@ -112,6 +114,7 @@ class NodeValues:
     """Works of adhesion on the nodes of a surface, (n, n), J/m^2, with rows along y and columns along x."""
 
     values: np.ndarray
+    kind = "map"
 
     def __post_init__(self):
         """Check the values."""
@@ -198,7 +201,7 @@ def read_map(file: str, unit: float, sha256: str) -> NodeValues:
 
 AdhesionMap = Stripes | Patches | NodeValues
 # Names of the maps in configurations.
-MAPS = {"stripes": Stripes, "patches": Patches}
+MAPS = {each.kind: each for each in (Stripes, Patches)}
 
 
 def map_of(value: object) -> AdhesionMap | None:

@@ -17,7 +17,7 @@ from icha.datasets.variables.campaign import (
     STATUS_ATTRIBUTES,
     WHOLE_RUNS,
 )
-from icha.datasets.variables.run import FURTHER, INDENTER, OF_LOSS
+from icha.datasets.variables.run import FURTHER, OF_LOSS, OF_SOME
 from icha.path.targets import BETWEEN
 
 # Variables of the campaign dataset that describe a run; datasets of runs do not have these variables.
@@ -103,7 +103,7 @@ def variables_of_run(tree: xr.DataTree, labels: RunLabels | tuple) -> tuple[dict
         if name in left_out:
             continue
         variable = of_study[tuple(index.get(dim, slice(None)) for dim in of_study.dims)].load()
-        may_lack = name in INDENTER or (ended_early and variable.ndim == 0)
+        may_lack = name in OF_SOME or (ended_early and variable.ndim == 0)
         if may_lack and variable.dtype.kind == "f" and variable.size and np.isnan(variable.values).all():
             continue  # the run lacks this variable
         if variable.dtype.kind == "f" and variable.encoding.get("dtype") == np.dtype("int32"):

@@ -34,7 +34,7 @@ from icha.datasets.variables.campaign import (
     WHOLE_RUNS,
     index_variable,
 )
-from icha.datasets.variables.run import CELLS, CYCLE, FURTHER, INDENTER, LOOP, OF_MODELS, RUN
+from icha.datasets.variables.run import CELLS, CYCLE, FURTHER, LOOP, OF_MODELS, OF_SOME, RUN
 from icha.path.targets import UNLOADING
 from icha.support.input_files import text
 
@@ -44,7 +44,7 @@ LabelledRun = tuple[RunLabels | tuple, xr.Dataset | str | os.PathLike]
 # Variables of runs that are in the campaign dataset: all except maps.
 _OF_RUNS = frozenset(
     name
-    for name, described in (RUN | OF_MODELS | CYCLE | LOOP | INDENTER).items()
+    for name, described in (RUN | OF_MODELS | CYCLE | LOOP | OF_SOME).items()
     if not set(CELLS) & set(described.dims)
 )
 # Values that must be the same for several runs count as equal up to this relative difference.
@@ -289,8 +289,8 @@ class _Study:
         owners = [model for model, names in FURTHER.items() if name in names]
         lacking = [model for model in self.axes["model"] if owners and model not in owners]
         missing = f"in runs with the model {' or '.join(lacking)}" if lacking else ""
-        if name in INDENTER and not everywhere:
-            missing = "in runs whose model, shape or path does not define the value"
+        if name in OF_SOME and not everywhere:
+            missing = "in runs whose model, material, shape or path does not define the value"
         if array.dtype.kind == "S":
             array = np.char.decode(array, "utf-8").astype(object)
         elif example.dtype.kind in "iu":

@@ -106,6 +106,7 @@ def _problems_with_run(run: xr.Dataset) -> Iterator[str]:
     if model not in MODELS:
         yield f"attribute contact_model: {model!r}; expected {' or '.join(MODELS)}"
     tables = [of_run.RUN | of_run.FURTHER.get(model, {}), of_run.CYCLE, of_run.LOOP]
+    tables += [of_run.LAYER, of_run.ADHESION_MAP]
     # A run on a free square has only some of these variables.
     tables.append({name: described for name, described in of_run.INDENTER.items() if name in run})
     if problems := list(_problems_with_variables(run, *tables)):

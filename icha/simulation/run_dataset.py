@@ -14,7 +14,7 @@ from icha.contact.model import GAP_BINS, PRESSURE_BINS, Events, gap_bins
 from icha.contact.models import MODELS
 from icha.datasets.attributes import COMPUTED, file_attributes
 from icha.datasets.build import bin_values, build_dataset, concatenate_rows, get_values, stack_rows
-from icha.datasets.variables.run import CYCLE, FURTHER, INDENTER, RUN
+from icha.datasets.variables.run import CYCLE, FURTHER, INDENTER, OF_SOME, RUN
 from icha.datasets.variables.terms import MATERIAL, ROUGHNESS, Table
 from icha.half_space.layer import softness_of
 from icha.path.targets import BETWEEN, UNITS, Path
@@ -41,7 +41,7 @@ def run_dataset(surface, material, path, name, seed, record, summits, reasons, o
     values = {
         **{axis: nodes for axis in ("x", "y") if axis in table},
         **_path_values(table, path, record, surface.grid),
-        **_indenter_values(surface, material, record.steps),
+        **_indenter_values(surface, record.steps),
         **_surface_values(surface, material, seed),
         **of_contact,
         "asperity_count": len(summits),
@@ -50,7 +50,7 @@ def run_dataset(surface, material, path, name, seed, record, summits, reasons, o
         **bin_values("pressure", PRESSURE_BINS * (material.contact_modulus * surface.unit_slope)),
     }
     dataset = build_dataset(
-        table | CYCLE | INDENTER | _describe_targets(table, path), values, _attributes(surface, material, path, name)
+        table | CYCLE | OF_SOME | _describe_targets(table, path), values, _attributes(surface, material, path, name)
     )
     if MODELS[name].by_summits:
         largest = max((step["contact_area_fraction"] for step in record.steps), default=0.0)
@@ -84,14 +84,13 @@ def _path_values(table: Table, path: Path, record: PathRecord, grid: int) -> dic
     }
 
 
-def _indenter_values(surface: Surface, material: Material, steps: Sequence[dict]) -> dict:
-    """Return the values of all steps as experiments have them, shape and layer, by variable name; {} if periodic."""
+def _indenter_values(surface: Surface, steps: Sequence[dict]) -> dict:
+    """Return the values of all steps as experiments have them, and the shape, by variable name; {} if periodic."""
     if not surface.free:
         return {}
     # Models leave out values that they do not have.
     names = [name for name, described in INDENTER.items() if described.dims and (not steps or name in steps[0])]
     values = stack_rows({name: INDENTER[name] for name in names}, steps, "step") if steps else {}
-    values["layer_thickness"] = material.thickness
     if surface.shape is not None:
         values["shape"] = str(surface.shape)
     radius = sphere_radius(surface)
@@ -123,6 +122,8 @@ def _target_unit(kinds: set[str], named_by: str) -> dict:
 
 def _surface_values(surface: Surface, material: Material, seed: int) -> dict:
     """Return the values of the surface and the material, by variable name."""
+    layer = {"layer_thickness": material.thickness, "layer_poisson_ratio": material.poisson_ratio}
+    kind = {"adhesion_map_kind": material.adhesion_map.kind} if material.adhesion_map else {}
     moments, (skewness, kurtosis) = spectral_moments(surface), height_statistics(surface)
     wavelength, estimated = shortest_wave(surface)
     energy, complete = surface.full_contact(softness_of(material))
@@ -150,6 +151,8 @@ def _surface_values(surface: Surface, material: Material, seed: int) -> dict:
         "height_skewness": skewness,
         "height_kurtosis": kurtosis,
         "slope_anisotropy": slope_anisotropy(surface),
+        **(layer if material.layered else {}),
+        **kind,
     }
 
 
@@ -160,7 +163,7 @@ def _attributes(surface, material, path, name):
         f"Rough contact {'with' if material.surface_energy > 0 else 'without'} adhesion, {model.title}",
         f"{'Loading and unloading' if path.cyclic else 'Loading sweep'} of a "
         f"{'periodic rough surface' if not surface.free else 'single square'} against an "
-        f"elastic half-space by {model.method}.",
+        f"elastic {'layer on a rigid base' if material.layered else 'half-space'} by {model.method}.",
         COMPUTED,
         references=f"{model.references}; {_STICKINESS_PAPER}",
     )

@@ -153,7 +153,7 @@ def test_run_of_a_smooth_sphere_has_the_values_of_jkr():
     run = icha.simulate(SMOOTH, material, icha.Path(contact_radii=[9e-6], unload=True), model="boundary_elements")
     assert "failed_checks" not in run.attrs and run.attrs["applicability"] == ""
     assert str(run["shape"].values) == "sphere of radius 0.001 m" and run["shape_radius"] == RADIUS
-    assert np.isinf(run["layer_thickness"]) and has_radius(run)
+    assert "layer_thickness" not in run and has_radius(run)
     assert not has_radius(run.assign(layer_thickness=1e-5)), "figures draw no curves of Hertz and JKR"
     # Boundary elements with few cells are accurate to a few per cent.
     accuracy = 0.03

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from icha.datasets.variables.run import ADHESION_MAP, LAYER
 from icha.datasets.variables.terms import Variable, bin_table, read_tables
 
 # Complete runs are results. The file of a run with failed checks contains values, but these values must not be used.
@@ -51,7 +52,7 @@ VARIES_WITH = {
     **dict.fromkeys(
         ("contact_modulus", "surface_energy", "receding_energy", "interaction_range", "flaw_radius"), ("material",)
     ),
-    **dict.fromkeys(("theoretical_strength", "interface_strength", "layer_thickness"), ("material",)),
+    **dict.fromkeys(("theoretical_strength", "interface_strength", *LAYER, *ADHESION_MAP), ("material",)),
     **dict.fromkeys(("rms_height", "rms_curvature", "unit_height", "unit_slope", "nayak_parameter"), _TOPOGRAPHY),
     **dict.fromkeys(("spectral_moment_0", "spectral_moment_2", "spectral_moment_4"), _TOPOGRAPHY),
     **dict.fromkeys(("height_skewness", "height_kurtosis", "slope_anisotropy"), _TOPOGRAPHY),

@@ -34,7 +34,6 @@ _ATTRIBUTES = {
     "short_wavelength": {INFINITE: "on a smooth shape without waves"},
     "tabor_parameter": {INFINITE: "on a smooth shape without a radius of curvature"},
     "pull_off_over_summits": {INFINITE: "on a surface without summits"},
-    "layer_thickness": {INFINITE: "for a half-space"},
     "slope_anisotropy": {INFINITE: "for straight grooves"},
     "gap_map": {INFINITE: "where a shape has no surface"},
     "event_kind": {
@@ -45,9 +44,12 @@ _ATTRIBUTES = {
     "loss_by_jump_in": _SUM,
     "loss_by_jump_off": _SUM,
 }
-# Variables of every run, of runs whose path continues after the first loading, of runs that end in separation, and of
-# runs on a free square. Not every run on a free square has all variables of INDENTER.
-RUN, CYCLE, LOOP, INDENTER = read_tables("run.txt", TERMS, _ATTRIBUTES, meaning=MEANING).values()
+# Variables of every run, of runs whose path continues after the first loading, of runs that end in separation, of runs
+# on a free square, of runs on a layer, and of runs with a map of works of adhesion. Not every run on a free square has
+# all variables of INDENTER.
+RUN, CYCLE, LOOP, INDENTER, LAYER, ADHESION_MAP = read_tables("run.txt", TERMS, _ATTRIBUTES, meaning=MEANING).values()
+# Variables that only some runs of a study have.
+OF_SOME = INDENTER | LAYER | ADHESION_MAP
 # Coordinates of the cells in maps.
 _PLACES = {axis: TERMS[axis]._replace(dims=(dim,), coordinate=True) for axis, dim in zip("yx", CELLS, strict=True)}
 # Variables of the hysteresis loss, which are not valid if a run fails a check of its energies.
