@@ -53,7 +53,10 @@ def _scale(campaign: Campaign, case: RunLabels) -> dict[str, float]:
 
 
 def adhesive_contacts(campaign: Campaign, surface: str) -> list[dict]:
-    """Return all pairs of rms slope and adhesive material in the runs on a surface, without repetition."""
+    """Return all pairs of rms slope and adhesive half-space in the runs on a surface, without repetition.
+
+    Theories of rough contact do not hold on layers.
+    """
     pairs = dict.fromkeys((case.rms_slope, case.material) for case in campaign.all_runs if case.surface == surface)
     return [
         {
@@ -62,7 +65,7 @@ def adhesive_contacts(campaign: Campaign, surface: str) -> list[dict]:
             "material": campaign.materials[name].model_dump(exclude_none=True, exclude={"adhesion_map"}),
         }
         for rms_slope, name in pairs
-        if campaign.materials[name].surface_energy > 0
+        if campaign.materials[name].surface_energy > 0 and campaign.materials[name].thickness is None
     ]
 
 

@@ -16,7 +16,7 @@ from icha.figures.drawn import Name, plot, record, say
 from icha.figures.ensembles import draw_members
 from icha.figures.looks import ASPERITIES_NAME, legend_below
 from icha.figures.measured import Measured, name_sources
-from icha.figures.select import NothingToDraw, has_shape
+from icha.figures.select import NothingToDraw, has_layer, has_shape
 from icha.figures.style import BLACK, DASHES, GREY, in_style, logarithmic_axes, new_panels
 from icha.references.bare_runs import ciavarella_states
 
@@ -77,7 +77,7 @@ def area_and_gap(
             say(fig, "Theories are those of the first surface.")
         _draw_separate_summits(axes[0], panels, references, study, dataset, shown.looks)
     elif references is not None and (unit := _only_unit(shown)):
-        say(fig, "Theories are those of contact without adhesion.")
+        say(fig, "Theories are those of contact without adhesion.", theories_of_flat_surfaces(dataset))
         _draw_persson(axes[0], panels, references, x, unit)
     for ax, panel in zip(axes[0], panels, strict=True):
         panel.label(ax, lowest=not compared)
@@ -181,8 +181,9 @@ def _draw_differences(axes, shown, compared, gap):
         logarithmic_axes(ax, "x")
         ax.axhline(0, color="0.6", lw=0.6, zorder=0)
         ax.set_ylabel(rf"${quantity(error).symbol}$  (%)")
-    bare = {truth.runs.line.place: truth.runs.by_seed for _, truth in compared if not truth.runs.surface_energy}
-    adhesive = [truth for _, truth in compared if truth.runs.surface_energy]
+    flat = [truth for _, truth in compared if not has_layer(truth.runs.first)]
+    bare = {truth.runs.line.place: truth.runs.by_seed for truth in flat if not truth.runs.surface_energy}
+    adhesive = [truth for truth in flat if truth.runs.surface_energy]
     for truth in adhesive:
         seed = next(iter(truth.stops))
         without = bare.get(truth.runs.line.place, {}).get(seed)

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from icha.configuration.cases import run_settings, surface_cases, surface_settings
+from icha.configuration.cases import adhesive_contacts, run_settings, surface_cases, surface_settings
 from icha.surfaces.shapes import Cone, CylinderPunch, FlatPunch, Paraboloid, Sphere, Wave
 
 BALL = {"kind": "smooth", "side": "200 um", "grid": 64, "shape": {"sphere": {"radius": "1 mm"}}}
@@ -63,6 +63,8 @@ def test_the_thickness_of_a_layer_is_varied(load):
     campaign = load(changes).campaign
     layers = {case.material: campaign.materials[case.material].thickness for case in campaign.all_runs}
     assert sorted(layers.values()) == [1e-3, 2e-3]
+    # Fuller & Tabor and other theories are for half-spaces.
+    assert adhesive_contacts(load(BY_CELLS).campaign, "rough") and not adhesive_contacts(campaign, "rough")
 
 
 @pytest.mark.parametrize(
