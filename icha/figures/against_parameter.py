@@ -31,7 +31,16 @@ from icha.figures.looks import (
     legend_below,
     model_handle,
 )
-from icha.figures.style import GREY, ONE_COLUMN, TWO_COLUMNS, in_style, logarithmic_axes, new_panels
+from icha.figures.style import (
+    GREY,
+    ONE_COLUMN,
+    TWO_COLUMNS,
+    Interface,
+    in_style,
+    interfaces_of,
+    logarithmic_axes,
+    new_panels,
+)
 from icha.support.formatting import choose_unit
 
 _NEEDED = "the figure needs a surface energy"
@@ -62,7 +71,8 @@ def tabor(campaign: xr.DataTree, *, study: str, kind: str | None = None, target:
     dataset = campaign[study].to_dataset()
     state = select.kind_and_target(dataset, find_snapshot(dataset, kind, target))
     # Materials that differ only in the range of attraction form one line with the name of the first material.
-    materials: dict[tuple, str] = {}
+    materials: dict[Interface, str] = {}
+    interfaces = interfaces_of([campaign[study].to_dataset()])
     curves: dict[select.Line, list[select.ContactRuns]] = {}
     bare: dict[select.Line, list[select.ContactRuns]] = {}
     for group in groups:
@@ -71,7 +81,7 @@ def tabor(campaign: xr.DataTree, *, study: str, kind: str | None = None, target:
         if not states:
             continue
         group = group._replace(by_seed=states)
-        of_material = float(group.first["contact_modulus"]), group.surface_energy
+        of_material = interfaces[group.labels.material]._replace(interaction_range=None)
         line = group.line._replace(material=materials.setdefault(of_material, group.labels.material))
         if group.surface_energy > 0:
             curves.setdefault(line, []).append(group)
@@ -365,6 +375,7 @@ def _draw_losses(ax, lines, looks):
     """Draw the losses of all lines with fits; return legend entries."""
     drawn = {line: Points(found, *_LOSS) for line, found in lines.items()}
     handles = looks.handles(ls="none") if looks.many else {}
+    without_doubt = {line.contact for line in drawn if not line.doubt}
     for line, points in drawn.items():
         handle, name = points.draw(ax, _look_of_loss(looks, line)), looks.name(line)
         (x, y), words = points.means, ""
@@ -376,7 +387,7 @@ def _draw_losses(ax, lines, looks):
             words = f": $r^2$ = {r_squared:.4f}, exponent {exponent:.2f}"
             look = {"color": looks.colour(line), "lw": 0.9, "zorder": 2}
             plot(ax, along, values, points.name._replace(curve="fitted line"), **look)
-        if not looks.many and (fitted or looks.is_beside(line)):
+        if not looks.many and (fitted or looks.is_beside(line) or line.contact not in without_doubt):
             handles.setdefault(name + words, handle)
     means = np.concatenate([points.means for points in drawn.values()], axis=1)
     if all(values.min() > 0 and values.max() > _LOSS_SPAN * values.min() for values in means):

@@ -36,8 +36,9 @@ from icha.figures.style import (
     GREY,
     format_number,
     in_style,
+    interfaces_of,
     legend_handle,
-    material_label,
+    material_labels,
     new_grid,
     new_panels,
     slope_label,
@@ -293,8 +294,8 @@ def snap_map(campaign: xr.DataTree, surface: xr.Dataset, *, run: Sequence) -> Fi
     say(fig, _EVENTS, grid_of_loops(campaign, [labels.study]))
     handles = _draw_places(where, topography_of(data, surface), events)
     _draw_counts(when, events)
-    title = f"{material_label(campaign[labels.study].to_dataset(), labels.material)}, {slope_label(labels.rms_slope)}"
-    when.set_title(title, loc="right", fontsize="small")
+    material = material_labels(interfaces_of([campaign[labels.study].to_dataset()]))[labels.material]
+    when.set_title(f"{material}, {slope_label(labels.rms_slope)}", loc="right", fontsize="small")
     handles |= {name: legend_handle(color=GREY, ls=dashes, lw=1.1) for name, dashes in BRANCH_DASHES.items()}
     if doubt := select.doubt_about_loop(data):
         handles |= {doubt: legend_handle(ls="none")}

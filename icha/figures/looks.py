@@ -21,7 +21,7 @@ from icha.datasets.labels import RunLabels, slopes_of
 from icha.datasets.quantities import symbol_of
 from icha.figures.drawn import scatter_handles
 from icha.figures.select import FINITE_RANGE_NAME, Line
-from icha.figures.style import BLACK, COLOURS, GREY, INTERFACE, legend_handle, material_label, slope_label
+from icha.figures.style import BLACK, COLOURS, GREY, interfaces_of, legend_handle, material_labels, slope_label
 from icha.support.formatting import format_quantity
 
 # The colours of Okabe and Ito except black, and darker colours of the same hues. Black lines are theories.
@@ -89,10 +89,10 @@ class Looks:
         self.models = list(dict.fromkeys(MODELS[line.model].words for line in lines))
         crosses = len(self.models) > 1 if crosses is None else crosses
         self._few = len(contacts) <= FEW_LINES
-        interfaces = xr.concat([campaign[study].to_dataset()[INTERFACE] for study in studies], "material")
+        interfaces = interfaces_of(campaign[study].to_dataset() for study in studies)
         self.materials = list(dict.fromkeys(material for material, *_ in contacts))
-        interfaces = interfaces.drop_duplicates("material")
-        self._interfaces = interfaces.sel(material=self.materials) if only_drawn else interfaces
+        self._interfaces = {each: interfaces[each] for each in self.materials} if only_drawn else interfaces
+        self._material_labels = material_labels(self._interfaces)
         self.places = list(dict.fromkeys(tuple(place) for _, *place in contacts))
         self.by_place = len(self.places) > (len(CROSSES) if crosses else MOST_COLOURS)
         self.by_place |= (len(self.materials) == 1 if by_place is None else by_place) and len(self.places) > 1
@@ -118,7 +118,7 @@ class Looks:
 
     def adhesive(self, material: str) -> bool:
         """Return True if the surface energy of a material is positive."""
-        return float(self._interfaces["surface_energy"].sel(material=material)) > 0
+        return bool(self._interfaces[material].surface_energy)
 
     def is_beside(self, line: Line) -> bool:
         """Return True if a line shows boundary elements beside another model."""
@@ -206,12 +206,12 @@ class Looks:
         return (line.place, line.material) if self.by_place else (line.material, line.place)
 
     def label(self, key: str | tuple[str, float | None]) -> str:
-        """Return modulus and surface energy of a material as text, or surface and rms slope of a place.
+        """Return the label of a material, or surface and rms slope of a place as text.
 
         A surface or slope that all lines have in common is left out.
         """
         if isinstance(key, str):
-            return material_label(self._interfaces, key)
+            return self._material_labels[key]
         surface, slope = key
         surfaces, slopes = (set(each) for each in zip(*self.places, strict=True))
         words = [surface_label(self._campaign, surface)] if len(surfaces) > 1 else []
@@ -251,7 +251,7 @@ def run_label(campaign: xr.DataTree, labels: RunLabels) -> str:
     words = [surface_label(campaign, labels.surface)]
     words += [f"seed {labels.seed}"] if study.sizes["seed"] > 1 else []
     words += [slope_label(labels.rms_slope)] if len(slopes_of(study)) > 1 else []
-    return ", ".join([*words, material_label(study, labels.material)])
+    return ", ".join([*words, material_labels(interfaces_of([study]))[labels.material]])
 
 
 def _symbol_and_value(name, values, k):

@@ -2,9 +2,11 @@
 
 import os
 import textwrap
+from collections.abc import Iterable, Mapping
 from contextlib import contextmanager
 from functools import partial
 from string import ascii_lowercase
+from typing import NamedTuple
 
 import matplotlib as mpl
 import numpy as np
@@ -187,34 +189,78 @@ def format_number(value: float) -> str:
     return f"${power}$" if mantissa == "1" else rf"${mantissa}\times{power}$"
 
 
-# Variables that distinguish materials.
-INTERFACE = ["contact_modulus", "surface_energy", "receding_energy", "interaction_range"]
+class Interface(NamedTuple):
+    """Variables that distinguish materials; None where a material lacks a variable or has no run."""
 
-# Symbol and unit of each variable in the label of a material.
-_LABELS = (
-    ("contact_modulus", r"$E^{\ast}$", "Pa"),
-    ("surface_energy", r"$\Delta\gamma$", "J/m²"),
-    ("receding_energy", "receding", "J/m²"),
-)
+    contact_modulus: float | None
+    surface_energy: float | None
+    receding_energy: float | None
+    interaction_range: float | None
+    flaw_radius: float | None
+    layer_thickness: float | None
+    layer_poisson_ratio: float | None
+    adhesion_map_kind: str | None
 
 
-def material_label(study: xr.Dataset, material: str) -> str:
-    """Return a legend text with the modulus and the surface energy of a material, in the same units for a whole study.
+def interfaces_of(studies: Iterable[xr.Dataset]) -> dict[str, Interface]:
+    """Return the interface of every material of some studies, by name."""
+    found: dict[str, Interface] = {}
+    for study in studies:
+        names = study["material"].values.tolist()
+        columns = [study[each].values.tolist() if each in study else [None] * len(names) for each in Interface._fields]
+        for name, *values in zip(names, *columns, strict=True):
+            found.setdefault(name, Interface(*(None if each != each or each == "" else each for each in values)))
+    return found
 
-    The work of adhesion of receding edges is added if it differs from the surface energy, and the range of attraction
-    if two materials of the study are otherwise the same.
+
+def material_labels(interfaces: Mapping[str, Interface]) -> dict[str, str]:
+    """Return a legend text for each material, with quantities in the same units for all; no two are the same.
+
+    The text has modulus and work of adhesion, and where a material has them a map of works of adhesion, another work of
+    receding edges, the thickness of a layer, and flaws. Materials that do not differ in these have the Poisson ratio of
+    their layer and the range of attraction if these differ, or else their names.
     """
-    values = study.sel(material=material)
-    words, alike = [], True
-    for name, symbol, unit in _LABELS:
-        value = float(values[name])
-        factor, prefixed = choose_unit(float(study[name].max()), unit)
-        if name != "receding_energy" or value != values["surface_energy"]:
-            words.append(f"{symbol} = {value * factor:.4g} {prefixed}" if value > 0 else f"{symbol} = 0")
-        alike &= study[name] == values[name]
-    if int(alike.sum()) > 1:
-        words.append(f"range {format_quantity(float(values['interaction_range']), 'm')}")
+    labels = {name: _usual_words(each, interfaces.values()) for name, each in interfaces.items()}
+    ratios = {name: _poisson_ratio(each) for name, each in interfaces.items()}
+    ranges = {name: _range(each) for name, each in interfaces.items()}
+    for texts in (ratios, ranges, {name: name for name in interfaces}):
+        alike: dict[str, list[str]] = {}
+        for name, label in labels.items():
+            alike.setdefault(label, []).append(name)
+        for label, names in alike.items():
+            if len({texts[name] for name in names}) > 1:
+                labels |= {name: f"{label}, {texts[name]}" for name in names}
+    return labels
+
+
+def _usual_words(interface, interfaces):
+    """Return what the label of a material contains, whatever the other materials are."""
+
+    def of(name, symbol, unit):
+        value = getattr(interface, name)
+        largest = max((getattr(each, name) or 0.0 for each in interfaces), default=0.0)
+        factor, prefixed = choose_unit(largest, unit)
+        return f"{symbol} = {value * factor:.4g} {prefixed}" if value else f"{symbol} = 0"
+
+    work, kind = of("surface_energy", r"$\Delta\gamma$", "J/m²"), interface.adhesion_map_kind
+    words = [of("contact_modulus", r"$E^{\ast}$", "Pa"), f"mean {work} ({kind})" if kind else work]
+    if interface.receding_energy not in (None, interface.surface_energy):
+        words.append(of("receding_energy", "receding", "J/m²"))
+    if interface.layer_thickness:
+        words.append(f"thickness {format_quantity(interface.layer_thickness, 'm')}")
+    if interface.flaw_radius and interface.surface_energy:
+        words.append(f"flaw radius {format_quantity(interface.flaw_radius, 'm')}")
     return ", ".join(words)
+
+
+def _poisson_ratio(interface):
+    """Return the Poisson ratio of a layer as text; a half-space does not depend on it."""
+    return "" if interface.layer_poisson_ratio is None else f"Poisson ratio {interface.layer_poisson_ratio:.4g}"
+
+
+def _range(interface):
+    """Return the range of attraction as text; without adhesion, it does not matter."""
+    return f"range {format_quantity(interface.interaction_range, 'm')}" if interface.surface_energy else ""
 
 
 def slope_label(slope: float) -> str:

@@ -21,7 +21,7 @@ from icha.figures.looks import material_colours
 from icha.figures.maps import average_blocks, wrap_circles
 from icha.figures.measured import read_measurements
 from icha.figures.select import NothingToDraw, branches, path_steps, select_runs
-from icha.figures.style import save
+from icha.figures.style import interfaces_of, material_labels, save
 from icha.references.persson import persson_pressure_density
 from icha.references.theories import reference_dataset
 from icha.surfaces.moments import spectral_moments
@@ -227,6 +227,72 @@ def test_fig2_draws_theories_of_separate_summits_where_there_are_any():
         assert np.all(drawn[1].get_xdata() > 0)
         runs = {line.get_markeredgecolor() for line in axes.get_lines() if line.get_marker() not in ("1", "x", "None")}
         assert drawn[1].get_color() in runs
+
+
+def labels_of(**materials):
+    """Return the labels of materials in one study, from their differences to a half-space without a map."""
+    usual = {"contact_modulus": 2e6, "surface_energy": 5e-3, "receding_energy": None, "interaction_range": 5e-10}
+    usual |= {"flaw_radius": 0.0, "layer_thickness": np.nan, "layer_poisson_ratio": np.nan, "adhesion_map_kind": ""}
+    values = [usual | given for given in materials.values()]
+    for each in values:
+        each["receding_energy"] = each["receding_energy"] or each["surface_energy"]
+    variables = {name: ("material", [each[name] for each in values]) for name in usual}
+    found = material_labels(interfaces_of([xr.Dataset(variables, {"material": [*materials]})]))
+    return [found[name].replace(r"$E^{\ast}$ = 2 MPa, $\Delta\gamma$ = 5 mJ/m²", "usual") for name in materials]
+
+
+def layer(thickness, poisson_ratio=0.5, **further):
+    return {"layer_thickness": thickness, "layer_poisson_ratio": poisson_ratio, **further}
+
+
+def test_labels_name_what_distinguishes_materials():
+    assert labels_of(half={}) == ["usual"]
+    found = labels_of(half={}, thin=layer(1e-5), stiff=layer(1e-5, 0.3), flawed={"flaw_radius": 1e-6})
+    expected = ["", ", thickness 10 µm, Poisson ratio 0.5", ", thickness 10 µm, Poisson ratio 0.3"]
+    assert found == [f"usual{each}" for each in [*expected, ", flaw radius 1 µm"]]
+    found = labels_of(half={}, long={"interaction_range": 2e-9}, directed={"receding_energy": 9e-3})
+    assert found == ["usual, range 500 pm", "usual, range 2 nm", "usual, receding = 9 mJ/m²"]
+    found = labels_of(one={"adhesion_map_kind": "stripes"}, half={}, another={"adhesion_map_kind": "map"})
+    assert found[1] == "usual" and found[0].endswith(r"mean $\Delta\gamma$ = 5 mJ/m² (stripes)")
+    assert found[2].endswith("(map)")
+    # A map and another map of the same mean have their names, because no number distinguishes them.
+    maps = labels_of(wide={"adhesion_map_kind": "map"}, narrow={"adhesion_map_kind": "map"})
+    assert [label.rpartition(", ")[2] for label in maps] == ["wide", "narrow"]
+
+
+def test_labels_of_materials_without_adhesion_have_no_range_of_attraction():
+    bare = {"surface_energy": 0.0}
+    found = labels_of(**{f"t{thickness:g}": layer(thickness, **bare) for thickness in (3e-6, 1e-5, 1e-4)})
+    assert [label.partition("= 0")[2] for label in found] == [f", thickness {each} µm" for each in (3, 10, 100)]
+
+
+def with_layers(runs):
+    """Return the runs as if their material were a layer."""
+    return {labels: run.assign(layer_thickness=1e-5, layer_poisson_ratio=0.5) for labels, run in runs.items()}
+
+
+def test_figures_name_layers_and_draw_theories_of_half_spaces_with_a_sentence():
+    runs = {labels: run for labels, run in compared.patches() if labels.seed == 1}
+    films = {labels._replace(material=f"{labels.material}_film"): run for labels, run in with_layers(runs).items()}
+    tree = campaign_tree([*runs.items(), *films.items()])
+    theories = reference_dataset(small.SPECTRUM, spectral_moments(small.surface()), {})
+    sentence = "do not hold for runs on a layer"
+    for draw in (against_load.area_and_gap, against_load.stiffness):
+        assert sentence in caption_of(draw(tree, theories, study="one"))
+        assert sentence not in caption_of(draw(campaign_tree(runs.items()), theories, study="one"))
+    physical = against_load.area_and_gap(tree, theories, study="one", units="physical")
+    assert sentence in caption_of(physical) and "Persson" in legend(physical)
+    names = legend(at_one_load.distributions(tree, study="one"))
+    assert sum("thickness 10 µm" in name for name in names) == 2 and "Persson" in names
+
+
+def test_fig9_draws_a_layer_and_a_half_space_as_two_lines():
+    material = icha.Material(25e6, 0.05, 1e-9)
+    run = icha.simulate(small.surface(), material, icha.Path(reduced_pressures=[1e-2], max_step=0.2), seed=1)
+    labels = RunLabels("tabor", "asperities", "rough", 1, 1.0, "half")
+    tree = campaign_tree([(labels, run), *with_layers({labels._replace(material="film"): run}).items()])
+    figure = against_parameter.tabor(tree, study="tabor")
+    assert len(lines_of(figure.axes[0])) == 2 and sum("thickness" in name for name in legend(figure)) == 1
 
 
 def test_fig3_shows_boundary_elements_of_the_same_state():
@@ -485,6 +551,8 @@ def test_fig2_compares_the_estimate_from_bare_runs_with_adhesive_boundary_elemen
     (drawn,) = (line.get_ydata() for line in areas if len(line.get_ydata()))
     # These boundary elements are the states of asperities. Adhesion changes their areas by 6 to 19 %.
     assert len(drawn) > 6 and np.abs(drawn).max() < 8
+    layers = against_load.area_and_gap(campaign_tree(with_layers(runs).items()), study="one")
+    assert not any("Ciavarella" in name for name in legend(layers)), "the estimate is for half-spaces"
 
 
 def test_fig2_in_physical_units_has_pressures_and_gaps_with_units():

@@ -64,6 +64,8 @@ def test_means_over_fewer_seeds_are_crossed_and_runs_not_applicable_are_pale(mod
         assert any(np.isin(cross.get_xdata(), line.get_xdata()).all() for line in marked)
     assert legend(figure).count(FEWER_SEEDS) == legend(figure).count(f"pale: {NOT_APPLICABLE}") == 1
     if module is against_parameter.loss:
+        pale = draw(module, campaign(pale=SEEDS, run=run), "five")
+        assert sum("= 50 mJ/m²" in name for name in legend(pale)) == 1, "a pale line alone has an entry too"
         assert f"pale: {NOT_APPLICABLE}" in legend(draw(loops.loops, campaign(pale=(1,), run=run), "five"))
 
 
