@@ -18,6 +18,7 @@ from icha.datasets.campaign import select_run
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.format import RUN, problems_with_file
 from icha.datasets.labels import RunLabels
+from icha.report.tables import materials_table
 from icha.surfaces.moments import spectral_moments
 
 PERIOD, MODULUS, ENERGY, RANGE = 100e-6, 25e6, 0.05, 2.071e-9
@@ -77,6 +78,9 @@ def test_runs_on_layers_and_maps_say_so(boundary):
         assert (film["layer_thickness"], film["layer_poisson_ratio"]) == (1e-5, 0.4)
         assert film["layer_thickness"].attrs["units"] == "m" and film["layer_poisson_ratio"].attrs["long_name"]
         assert found[labels["striped"]]["adhesion_map_kind"] == "stripes"
+    table = materials_table({"one": tree["one"].to_dataset()})
+    bodies = {row[0]: row[-2:] for row in table.rows}
+    assert bodies == {"half": ("–", "–"), "film": ("10 µm", "0.4"), "striped": ("–", "–")}
     for each, run in runs.items():
         assert not problems_with_file(RUN, run)
         assert ("elastic layer on a rigid base" in run.attrs["summary"]) == (each.material == "film")

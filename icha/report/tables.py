@@ -135,13 +135,16 @@ def studies_table(studies: Mapping[str, xr.Dataset]) -> Table:
 
 
 def materials_table(studies: Mapping[str, xr.Dataset]) -> Table:
-    """Return the table of all materials."""
-    names = ("contact_modulus", "surface_energy", "receding_energy", "interaction_range")
+    """Return the table of all materials; it has flaws and layers only if a material has them."""
+    names = ["contact_modulus", "surface_energy", "receding_energy", "interaction_range"]
+    for name in ("flaw_radius", "layer_thickness", "layer_poisson_ratio"):
+        names += [name] if any(name in study and bool(study[name].any()) for study in studies.values()) else []
     rows = {}
     for study in studies.values():
         for material in study["material"].values.tolist():
             values = study.sel(material=material)
-            rows[material] = (material, *(_format(values[name].item(), quantity(name).unit) for name in names))
+            found = {name: values[name].item() if name in values else np.nan for name in names}
+            rows[material] = (material, *(_format(value, quantity(name).unit) for name, value in found.items()))
     return Table("Materials", ("material", *(_words(name) for name in names)), list(rows.values()))
 
 
