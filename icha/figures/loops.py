@@ -56,17 +56,14 @@ def loops(
     runs = select.select_by_labels(select.select_unloaded_runs(campaign, study), surface=surface, seed=seed)
     others = select.select_runs(campaign, boundary_elements or study, ragged=False, model=REFERENCE_MODEL)
     shown = {labels for labels, _ in runs}
-    truths = [run for labels, run in others if labels not in shown and select.unloading_legs(run)]
+    truths = [loop for loop in others if loop[0] not in shown and select.unloading_legs(loop[1])]
     slopes = sorted({labels.rms_slope for labels, _ in runs}, reverse=True)
     own_rows = len(runs) > _MOST_LOOPS and 1 < len(slopes) < len(runs)
     drawn = [(labels, run, select.Line.of(labels, select.doubt_about_loop(run))) for labels, run in runs]
     if own_rows:  # Slopes that have their own panels need no markers.
         drawn = [(*loop, line._replace(rms_slope=None)) for *loop, line in drawn]
     looks = Looks(campaign, [study], [line for *_, line in drawn], by_place=None)
-    drawn = [
-        (labels, run, [each for each in truths if not difference_of_contacts(run, each)], looks.look(line))
-        for labels, run, line in drawn
-    ]
+    drawn = [(labels, run, _of_same_contact(labels, run, truths), looks.look(line)) for labels, run, line in drawn]
 
     # A smooth shape has no roughness, whose height and slope are the reduced units.
     physical = units == "physical" or not any(float(run["rms_height"]) for _, run in runs)
@@ -105,6 +102,12 @@ def loops(
     say(fig, range_of_attraction(attractions_of(shown)), grid_of_loops(campaign, studies))
     legend_below(fig, _handles(looks, drawn, marked=len(rows[0]) > 1), looks.heading())
     return fig
+
+
+def _of_same_contact(labels, run, truths):
+    """Return the runs among `truths` with the material and the topography of a run; their grids may differ."""
+    alike = [truth for others, truth in truths if others.material == labels.material]
+    return [truth for truth in alike if not difference_of_contacts(run, truth)]
 
 
 def _panels(dataset, *, physical):

@@ -155,7 +155,9 @@ def test_what_cannot_be_compared_is_named():
     truth = own_patches(runs()[LABELS])
     for name in SHARED:
         with pytest.raises(ValueError, match=f"{TRUTH}: {name}"):
-            model_error(tree(), [(TRUTH, truth.assign({name: truth[name] * 1.001}))])
+            model_error(tree(), [(TRUTH, truth.assign({name: float(truth.get(name, 0.0)) * 1.001 or 1e-6}))])
+    with pytest.raises(ValueError, match=f"{TRUTH}: adhesion_map_kind is '' for the run, 'map'"):
+        model_error(tree(), [(TRUTH, truth.assign(adhesion_map_kind="map"))])
     with pytest.raises(ValueError, match=f"{TRUTH}: seed is 1 for the run, 2 for the other run"):
         model_error(tree(), [(TRUTH, truth.assign(seed=2))])
     with pytest.raises(ValueError, match="no seed 9"):

@@ -155,6 +155,22 @@ def test_fig13_draws_boundary_elements_over_their_run(name, markers):
     assert {f"{name}, loading", f"{name}, unloading"} <= set(legend(figure))
 
 
+@pytest.mark.parametrize("beside", [None, "truth"])
+def test_fig13_draws_no_boundary_elements_of_another_contact(beside):
+    """The inverted surface, or in another study a material with another work of receding edges."""
+    run = loop()
+    truth = run.assign_attrs(contact_model="boundary_elements", attraction="short range")
+    own = RunLabels("hard", "asperities", "rough", 1, 0.5, "soft")
+    of_own = own._replace(study=beside or "hard", model="boundary_elements")
+    name, factor = ("receding_energy", 2) if beside else ("height_skewness", -1)
+    other = of_own._replace(**({"material": "directed"} if beside else {"surface": "inverted"}))
+    twice = truth.assign({"reduced_pressure": 2 * truth["reduced_pressure"], name: factor * truth[name]})
+    runs = [(own, run), (of_own, truth), (other, twice)]
+    figure = loops.loops(campaign_tree(runs), study="hard", boundary_elements=beside, surface="rough")
+    crosses = [line.get_ydata() for line in marks(figure.axes[0]) if line.get_markersize() < 4]
+    assert max(map(max, crosses)) == pytest.approx(float(run["reduced_pressure"].max()))
+
+
 def test_fig14_shows_means_and_scatter_over_the_seeds(tree):
     figure = against_parameter.pull_off(tree, study="slopes", load_studies=list(DEPTHS))
     left, right = figure.axes
