@@ -41,8 +41,9 @@ from icha.support.formatting import choose_unit, format_quantity
 _MEASURED = {"ls": "none", "ms": 3.6, "mew": 0.8, "color": BLACK, "zorder": 5}
 _CROSSES = "x+1234"
 _FITS = """Where a fit is missing, the Tabor parameter of the sphere is below 3, the value from which JKR holds; there
-are fewer than three states; or the contact is so small that Hertz's law without adhesion fits better. Runs without
-adhesion, on shapes without a radius, and on layers are left out."""
+are fewer than three states; or the contact is so small that Hertz's law without adhesion fits better. Where the
+tension exceeds the pull-off force of a fit, which happens on rough spheres, the square root in its radius is set to
+zero. Runs without adhesion, on shapes without a radius, and on layers are left out."""
 
 
 class Series(NamedTuple):
