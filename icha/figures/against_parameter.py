@@ -14,6 +14,7 @@ from icha.analysis.model_error import snapshot_if_any, state_of
 from icha.asperity.material import WU_HOLDS_FROM
 from icha.asperity.tabor import sphere_pull_off_factor
 from icha.contact.attraction import FINITE_RANGE, SHORT_RANGE
+from icha.contact.models import MODELS
 from icha.datasets.campaign import find_snapshot, runs_with_loop, runs_with_snapshot
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import LOSS_PARTS, label_of
@@ -95,7 +96,10 @@ def tabor(campaign: xr.DataTree, *, study: str, kind: str | None = None, target:
     fig, [panels] = new_panels(3.1)
     quantities = ("contact_area_fraction", gap_name(dataset))
     say(fig, _RANGES, _TABOR)
-    show_runs(fig, study, runs_with_snapshot(dataset, *state), dataset["model"] == groups[0].labels.model)
+    model, *others = sorted(dataset["model"].values, key=groups[0].labels.model.__ne__)
+    left_out = "".join(f"; {MODELS[other].words} of the study are left out" for other in others)
+    say(fig, f"Curves are of {MODELS[model].words}{left_out}.")
+    show_runs(fig, study, runs_with_snapshot(dataset, *state), dataset["model"] == model)
     drawn = []
     for line, found in curves.items():
         points = Points(found, "tabor_parameter", *quantities)

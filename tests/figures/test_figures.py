@@ -195,6 +195,11 @@ def test_fig9_joins_runs_that_differ_in_range_and_shows_the_adhesionless_one(mon
     assert curve.get_xdata()[1] == pytest.approx(4 * curve.get_xdata()[0])
     monkeypatch.setattr(against_parameter, "_TABOR_SPAN", 3.9)
     assert (left.get_xscale(), against_parameter.tabor(tree, study="tabor").axes[0].get_xscale()) == ("linear", "log")
+    both = [RunLabels("tabor", model, "rough", 1, 1.0, "short") for model in ("asperities", "boundary_elements")]
+    both = campaign_tree([(both[0], runs["short"]), (both[1], runs["short"])])
+    caption = caption_of(against_parameter.tabor(both, study="tabor"))
+    assert "asperities; boundary elements of the study are left out" in caption
+    assert "Curves are of asperities." in caption_of(left.figure)
     # The range is along the axis, and not in the name.
     assert len(legend(left.figure)) == 2 and not any("range" in name for name in legend(left.figure))
     tree = campaign_tree([(RunLabels("tabor", "asperities", "rough", 1, 1.0, "bare"), runs["bare"])])
