@@ -15,7 +15,7 @@ from icha.contact.model import EVENT_KINDS
 from icha.contact.models import REFERENCE_MODEL
 from icha.datasets.campaign import find_snapshot, run_place, runs_with_labels, runs_with_snapshot
 from icha.datasets.labels import RunLabels
-from icha.datasets.quantities import label_of
+from icha.datasets.quantities import label_of, plain
 from icha.datasets.variables.campaign import LOADED_RUNS
 from icha.figures import select
 from icha.figures.captions import attractions_of, grid_of_loops, range_of_attraction
@@ -224,6 +224,9 @@ def spots_by_slope(
         on top of them. At a given contact area, the spots of all slopes nearly coincide, so every slope fills one
         sector of each circle in panel (b).""",
     )
+    if dataset.sizes["material"] > 1:
+        label = material_labels(interfaces_of([dataset]))[shown.material]
+        say(fig, f"The material has {plain(label).replace('$', '')}.")
     length, unit = choose_unit(float(runs[0][1]["period"]), "m")
     of_labels = runs_with_labels(dataset, surface=shown.surface, seed=shown.seed, material=shown.material)
     show_runs(fig, study, reached, of_labels & (dataset["model"] == shown.model))

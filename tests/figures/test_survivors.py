@@ -194,6 +194,12 @@ def test_spots_by_slope_leave_out_slopes_without_a_state_and_say_so():
     assert caption.startswith("The figure shows 1 of 2 runs; 1 ended before this state, with rms slope above 0.9; the")
 
 
+def test_spots_by_slope_name_their_material_if_the_study_has_several():
+    tree = campaign_tree([(labels, run) for labels, run in small.runs() if labels.study == "slopes"])
+    caption = caption_of(contact_maps.spots_by_slope(tree, study="slopes", material="soft"))
+    assert "The material has E* = 25 MPa, Δγ = 50 mJ/m²." in caption
+
+
 def test_captions_of_errors_count_seeds_that_ended_before_the_largest_load():
     truths = dict(compared.patches())
     runs = [
