@@ -120,7 +120,7 @@ def distributions(campaign: xr.DataTree, *, study: str, kind: str | None = None,
     left.set_ylim(floor / 2)
     for line, look in zip(lines, each_look, strict=True):
         _draw_singular_tail(right, line, 1.05 * lowest, look["color"])
-    _draw_persson(right, highest, lines, each_look)
+    drawn = _draw_persson(right, highest, lines, each_look)
     right.set_xlim(1.05 * np.array((lowest, highest)))
     if top > 0:
         right.set_ylim(top * 5e-5, top * 3)
@@ -128,13 +128,16 @@ def distributions(campaign: xr.DataTree, *, study: str, kind: str | None = None,
     unit = r"E^{\ast}h′_{\mathrm{rms}}"
     left.set(xlabel=r"gap  $u/h_{\mathrm{rms}}$", ylabel=r"$P(u)\; h_{\mathrm{rms}}$")
     right.set(xlabel=f"contact pressure  $p/({unit})$", ylabel=rf"$P(p)\; {unit}$")
-    say(fig, theories_of_flat_surfaces(dataset))
+    say(fig, theories_of_flat_surfaces(dataset, drawn=drawn))
     _finish(fig, [left, right], dataset, lines, looks)
     return fig
 
 
 def _draw_persson(ax, highest, lines, each_look):
-    """Draw Persson's theory up to the pressure `highest`, once for each load of the runs on a flat half-space."""
+    """Draw Persson's theory up to the pressure `highest`, once for each load of the runs on a flat half-space.
+
+    Return whether there is such a load.
+    """
     drawn, p = [], np.linspace(0.002, highest, 300)
     flat = [not (has_shape(line.members[0][0]) or has_layer(line.members[0][0])) for line in lines]
     for line, look, _ in filter(itemgetter(2), zip(lines, each_look, flat, strict=True)):
@@ -148,6 +151,7 @@ def _draw_persson(ax, highest, lines, each_look):
     if drawn:
         ax.plot([], [], color=GREY if several else BLACK, label="Persson", **look)
         say(ax, _PERSSON)
+    return bool(drawn)
 
 
 def _draw_singular_tail(ax, line, lowest, colour):

@@ -59,10 +59,14 @@ def units_of_shapes(figure: Figure, studies: Sequence[xr.Dataset]) -> str:
     the rms height of the shape, and this height divided by the side of the square."""
 
 
-def theories_of_flat_surfaces(study: xr.Dataset) -> str:
-    """Return why no theory is drawn, if the first surface has a shape, or for which runs theories do not hold."""
+def theories_of_flat_surfaces(study: xr.Dataset, *, drawn: bool = True) -> str:
+    """Return why no theory is drawn, if the first surface has a shape, or for which runs theories do not hold.
+
+    `drawn` is False if the figure draws no theory.
+    """
     if not has_shape(study.isel(surface=0)):
-        return "Theories are those of a half-space, and do not hold for runs on a layer." if has_layer(study) else ""
+        layers = "Theories are those of a half-space, and do not hold for runs on a layer."
+        return layers if drawn and has_layer(study) else ""
     return """Theories of rough contact are for nominally flat surfaces. They do not hold under a shape, so none is
     drawn."""
 

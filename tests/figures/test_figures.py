@@ -287,8 +287,11 @@ def test_figures_name_layers_and_draw_theories_of_half_spaces_with_a_sentence():
         assert sentence not in caption_of(draw(campaign_tree(runs.items()), theories, study="one"))
     physical = against_load.area_and_gap(tree, theories, study="one", units="physical")
     assert sentence in caption_of(physical) and "Persson" in legend(physical)
-    names = legend(at_one_load.distributions(tree, study="one"))
+    figure = at_one_load.distributions(tree, study="one")
+    names = legend(figure)
     assert sum("thickness 10 µm" in name for name in names) == 2 and "Persson" in names
+    assert sentence in caption_of(figure)
+    assert sentence not in caption_of(at_one_load.distributions(campaign_tree(films.items()), study="one"))
 
 
 def test_fig9_draws_a_layer_and_a_half_space_as_two_lines():
