@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from pydantic import ConfigDict, Field
 
+from icha.configuration.studies import is_unread
 from icha.contact.models import MODELS, REFERENCE_MODEL, first_model
 from icha.datasets import results
 from icha.datasets.labels import RunLabels
@@ -126,11 +127,25 @@ class TruthFigure(StudyFigure):
 
     boundary_elements: Name | None = Field(
         default=None,
-        description="Name of a study whose runs with boundary elements are also drawn. Default: the study itself, if "
-        "it has such runs.",
+        description="Name of a study whose runs with boundary elements are also drawn, where it has the same surface, "
+        "slope and material. Default: the study itself, if it has such runs.",
     )
 
     needs = {"boundary_elements": ("boundary elements",)}
+
+    def _option_problems(self, campaign, study):
+        yield from super()._option_problems(campaign, study)
+        if (other := self.boundary_elements) not in campaign.studies:
+            return
+        own, others = (
+            {(run.surface, run.rms_slope, run.material) for run in campaign.contacts(name)}
+            for name in (self.study, other)
+        )
+        # Slopes of scans are compared once they are known.
+        unknown = any(is_unread(slope) for _, slope, _ in own | others)
+        if own.isdisjoint(others) and not unknown:
+            expected = f"expected runs on the same surface, with the same slope and material as in study {self.study!r}"
+            yield ("boundary_elements",), other, f"has no run to compare; {expected}"
 
 
 class SnapshotFigure(StudyFigure):

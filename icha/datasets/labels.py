@@ -141,6 +141,15 @@ def place_of(data: xr.Dataset, wanted: Mapping[str, Any]) -> dict[str, int]:
     return {label: at[label] for label in wanted}
 
 
+def has_contact(data: xr.Dataset, labels: RunLabels) -> bool:
+    """Return whether a dataset has the surface, the rms slope and the material of a run."""
+    try:
+        place_of(data, {label: getattr(labels, label) for label in ("surface", "rms_slope", "material")})
+    except KeyError:
+        return False
+    return True
+
+
 def slopes_at(data: xr.Dataset, at: Mapping[str, int]) -> np.ndarray:
     """Return the rms slopes of the surface with index `at["surface"]`."""
     slopes = data.variables["rms_slope"]

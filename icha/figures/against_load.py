@@ -10,7 +10,7 @@ from icha.analysis.common_loads import at_common_loads, interpolate
 from icha.datasets.labels import RunLabels
 from icha.datasets.quantities import label_of, quantity
 from icha.figures import curves
-from icha.figures.captions import theories_of_flat_surfaces
+from icha.figures.captions import of_other_study, theories_of_flat_surfaces
 from icha.figures.curves import Panel, draw_theory, panel_in_units
 from icha.figures.drawn import Name, plot, record, say
 from icha.figures.ensembles import draw_members
@@ -269,6 +269,7 @@ def multi_slope(
             panel.label(ax, lowest=materials is rows[-1])
         curves.limit_ratios(row[1], values)
     legend_below(fig, shown.handles)
+    say(fig, of_other_study(boundary_elements))
     if measurements:
         say(fig, f"Lines without markers are measurements: {name_sources(measurements)}.")
     return fig

@@ -50,6 +50,13 @@ def about_boundary_elements(runs: Iterable[xr.Dataset], seeds: Iterable[Sequence
     return words
 
 
+def of_other_study(boundary_elements: str | None) -> str:
+    """Return which runs of another study are drawn as boundary elements; "" without such a study."""
+    if not boundary_elements:
+        return ""
+    return f"Boundary elements are those of study {boundary_elements} on the same surfaces, slopes and materials."
+
+
 def units_of_shapes(figure: Figure, studies: Sequence[xr.Dataset]) -> str:
     """Return a sentence on the reduced units of surfaces with a shape, if the labels of the figure have these units."""
     labels = [text for axes in figure.axes for text in (axes.get_xlabel(), axes.get_ylabel(), axes.get_title("right"))]

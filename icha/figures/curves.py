@@ -10,6 +10,7 @@ from matplotlib.lines import Line2D
 
 from icha.analysis.common_loads import at_common_loads
 from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
+from icha.datasets.labels import has_contact
 from icha.datasets.quantities import label_of, quantity
 from icha.figures import select
 from icha.figures.captions import about_boundary_elements
@@ -138,8 +139,9 @@ def study_curves(
 ) -> Curves:
     """Return the curves of a study, with boundary elements of the same study or of the study `boundary_elements`.
 
-    Curves without points in the `panel` are left out, if it is given. `open_markers` do not hide each other where
-    curves coincide; if colours distinguish surfaces and slopes, markers are closed for materials with adhesion.
+    Boundary elements on other surfaces, slopes or materials than those of the study are left out, and so are curves
+    without points in the `panel`, if it is given. `open_markers` do not hide each other where curves coincide; if
+    colours distinguish surfaces and slopes, markers are closed for materials with adhesion.
     """
 
     def has_points(group):
@@ -151,6 +153,7 @@ def study_curves(
     by_asperities, lines = groups[0].labels.model == DEFAULT_MODEL, []
     other = boundary_elements or (study if by_asperities else None)
     truths = select.select_runs(campaign, other, ragged=False, model=REFERENCE_MODEL) if other else []
+    truths = [(labels, run) for labels, run in truths if has_contact(dataset, labels)]
     grouped = list(filter(has_points, select.group_by_contact(campaign, truths)))
     materials = dataset["material"].values.tolist()
     drawn = sorted((group.line for group in groups), key=lambda line: materials.index(line.material))

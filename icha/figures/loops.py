@@ -11,7 +11,7 @@ from icha.contact.models import MODELS, REFERENCE_MODEL
 from icha.datasets.campaign import runs_with_labels, runs_with_unloading
 from icha.datasets.quantities import symbol_of
 from icha.figures import select
-from icha.figures.captions import attractions_of, grid_of_loops, range_of_attraction
+from icha.figures.captions import attractions_of, grid_of_loops, of_other_study, range_of_attraction
 from icha.figures.curves import Panel, panel_in_units
 from icha.figures.drawn import Name, plot, record, say, show_runs
 from icha.figures.looks import BRANCH_DASHES, MODEL_MARKERS, UNLOADING_MARKERS, Looks, legend_below, pale, surface_label
@@ -78,6 +78,7 @@ def loops(
     topography = runs_with_labels(dataset, surface=labels.surface, seed=labels.seed)
     show_runs(fig, study, runs_with_unloading(dataset), topography)
     say(fig, _LOOPS if physical else f"{_LOOPS} In reduced units, that energy is divided by E* h'rms h_rms.")
+    say(fig, of_other_study(boundary_elements))
     for (left, *middle, right), shown_loops, window in zip(panels, by_row, windows, strict=True):
         for ax, panel in ((left, pressures), *((ax, pressures) for ax in middle), (right, areas)):
             for loop in shown_loops:

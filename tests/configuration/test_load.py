@@ -128,6 +128,12 @@ def test_slopes_of_scans_are_compared_once_they_are_known(load):
     measured = {"surfaces.rough": measured_surface(), "studies.one.rms_slopes": "measured"}
     slope = load(measured).campaign.contacts("one")[0].rms_slope
     assert load({**measured, "figures": {"fig4_contact_map": {"study": "one", "rms_slope": slope}}})
+    targets = {"reduced_pressures": [0.01]}
+    truth = {"surfaces": ["rough"], "materials": ["soft"], "models": ["boundary_elements"], "targets": targets}
+    beside = {"figures": {"fig5_multi_slope": {"study": "one", "boundary_elements": "truth"}}, **measured}
+    assert load({**beside, "studies.truth": truth | {"rms_slopes": [slope]}})
+    with pytest.raises(ConfigurationError, match="'truth' has no run to compare"):
+        load({**beside, "studies.truth": truth | {"rms_slopes": [0.9 * slope]}})
     failures = [{"run": f"one/rough/seed0/slope{slope:g}/soft", "reason": "why"}]
     assert load({**measured, "publication": {"known_failures": failures}})
     with pytest.raises(ConfigurationError, match=r"rms_slope: 0.5 is not in study 'one'"):

@@ -380,6 +380,11 @@ def test_fig5_marks_boundary_elements_of_the_study_or_of_another():
         words = dict(zip(legend(figure), figure.legends[0].legend_handles, strict=True))
         (name,) = (each for each in words if each.startswith("boundary elements"))
         assert name.endswith(f"= {labels.rms_slope:g}") and words[name].get_marker() == "+"
+    for other in ({"surface": "scan"}, {"material": "film"}, {"rms_slope": 0.1}):
+        several = campaign_tree([*runs, (beside, own), (beside._replace(**other), own)])
+        figure = against_load.multi_slope(several, study="slopes", **options)
+        assert [len(lines_of(axes, "+")) for axes in figure.axes] == [1, 1], other
+        assert "those of study truth on the same surfaces, slopes and materials" in caption_of(figure)
 
 
 def test_fig10_shows_means_and_seeds_of_the_errors_in_per_cent():
