@@ -7,6 +7,7 @@ bright, and the legend names only some of the lines.
 """
 
 import itertools
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
 import matplotlib as mpl
@@ -214,7 +215,8 @@ class Looks:
             return self._material_labels[key]
         surface, slope = key
         surfaces, slopes = (set(each) for each in zip(*self.places, strict=True))
-        words = [surface_label(self._campaign, surface)] if len(surfaces) > 1 else []
+        # Crosses may be on a surface of which the figure has no line.
+        words = [surface_labels(self._campaign, surfaces | {surface})[surface]] if len(surfaces) > 1 else []
         return ", ".join([*words, slope_label(slope)] if slope is not None and len(slopes) > 1 else words)
 
     def rank(self, line: Line) -> int:
@@ -232,17 +234,42 @@ class Looks:
 
 
 def surface_label(campaign: xr.DataTree, surface: str) -> str:
-    """Return the name of a surface; if parameters are varied, the name of the original surface and the parameters."""
+    """Return a label of a surface that no other surface of its study has."""
+    return surface_labels(campaign, [surface])[surface]
+
+
+def surface_labels(campaign: xr.DataTree, surfaces: Iterable[str]) -> dict[str, str]:
+    """Return a legend text for each surface; no two are the same.
+
+    The text is the name of the surface; if parameters are varied, it is the name of the original surface and those
+    parameters that are coordinates. Surfaces that do not differ in these have their names.
+    """
+    found: dict[str, str] = {}
     for study in campaign.children.values():
-        names = study["surface"].values.tolist()
-        coordinates = study.coords.items()
-        varied = {name: each for name, each in coordinates if "varied" in each.attrs and each.dims == ("surface",)}
-        if surface in names and varied:
-            words = [_symbol_and_value(name, each, names.index(surface)) for name, each in varied.items()]
-            # Names of variants begin with the name of the original surface, a hyphen and the first varied parameter.
-            origins = {each: each.partition(f"-{next(iter(varied))}")[0] for each in names}
-            return ", ".join(([origins[surface]] if len(set(origins.values())) > 1 else []) + words)
-    return surface
+        found = _labels_of_variants(study) | found
+    return _names_of_repeated({name: found.get(name, name) for name in surfaces})
+
+
+def _labels_of_variants(study):
+    """Return the labels of the surfaces of a study by name; none if no parameter of surfaces is a coordinate."""
+    coordinates = study.coords.items()
+    varied = {name: each for name, each in coordinates if "varied" in each.attrs and each.dims == ("surface",)}
+    if not varied:
+        return {}
+    # Names of variants begin with the name of the original surface, a hyphen and the first varied parameter.
+    origins = {each: each.partition(f"-{next(iter(varied))}")[0] for each in study["surface"].values.tolist()}
+    several = len(set(origins.values())) > 1
+    labels = {}
+    for k, (name, origin) in enumerate(origins.items()):
+        words = list(filter(None, (_symbol_and_value(parameter, values, k) for parameter, values in varied.items())))
+        labels[name] = ", ".join([origin, *words] if several or not words else words)
+    return _names_of_repeated(labels)
+
+
+def _names_of_repeated(labels):
+    """Return labels by name, with the name itself instead of a label that several names have."""
+    counts = Counter(labels.values())
+    return {name: label if counts[label] == 1 else name for name, label in labels.items()}
 
 
 def run_label(campaign: xr.DataTree, labels: RunLabels) -> str:
@@ -255,8 +282,10 @@ def run_label(campaign: xr.DataTree, labels: RunLabels) -> str:
 
 
 def _symbol_and_value(name, values, k):
-    """Return the symbol of a varied parameter with the value at index `k`, as text."""
+    """Return the symbol of a varied parameter with the value at index `k`, as text; "" without a value."""
     value = values.values[k]
+    if value == "" or value != value:
+        return ""
     if isinstance(value, str):
         shown = value
     else:

@@ -14,7 +14,7 @@ from scipy.interpolate import CubicHermiteSpline
 from icha.contact.models import REFERENCE_MODEL
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import RunLabels
-from icha.datasets.quantities import label_of
+from icha.datasets.quantities import label_of, symbol_of
 from icha.figures import against_parameter, contact_maps, loops
 from icha.figures.against_parameter import fit_line, shares
 from icha.figures.drawn import caption_of
@@ -213,6 +213,39 @@ def test_fig14_shows_boundary_elements_beside_asperities():
     np.testing.assert_array_equal(asperities.get_ydata(), truth.get_ydata())
     assert (truth.get_xdata() > asperities.get_xdata()).all()
     assert {"asperities", "boundary elements"} < set(legend(figure))
+
+
+def with_variants(name, *variants):
+    """Return labels and runs of a study, once for each of these surfaces."""
+    return [(labels._replace(surface=each), run) for each in variants for labels, run in study(name, seeds=(1,))]
+
+
+def hursts(*variants):
+    """Return the Hurst exponents in the names of variants, as a varied parameter."""
+    return {"hurst": ("surface", "1", {each: float(each.partition("hurst")[2][:3]) for each in variants})}
+
+
+def test_surfaces_with_the_same_varied_parameters_have_their_names_in_legends_and_titles():
+    # Of the two varied parameters, the dataset has one as a coordinate.
+    variants = [f"scan-hurst{hurst}-grid{grid}" for hurst in (0.6, 0.9) for grid in (48, 96)]
+    tree = campaign_tree(with_variants("one", *variants), varied={"one": hursts(*variants)})
+    assert set(variants) < set(legend(against_parameter.pull_off(tree, study="one")))
+    assert variants[1] in loops.loops(tree, study="one", surface=variants[1]).get_suptitle()
+    # Of two original surfaces, each is alone in its study, but they are in the same figure.
+    one, *others = "scan-hurst0.6", "dust-hurst0.6", "dust-hurst0.9"
+    varied = {"one": hursts(one), "two": hursts(*others)}
+    tree = campaign_tree(with_variants("one", one) + with_variants("two", *others), varied=varied)
+    both = legend(against_parameter.pull_off(tree, study="one", load_studies=["two"]))
+    assert [name for name in both if "0.6" in name or "0.9" in name] == [one, "dust-hurst0.6", "$H$ = 0.9"]
+    assert {"$H$ = 0.6", "$H$ = 0.9"} < set(legend(against_parameter.pull_off(tree, study="two")))
+
+
+def test_the_label_of_a_surface_has_no_parameter_that_the_surface_lacks():
+    for first, expected in (("rough", "scan, "), ("scan", "")):
+        surfaces = first, "scan-cutoff4um"
+        varied = {"one": {"cutoff": ("surface", "m", {surfaces[1]: 4e-6})}}
+        figure = against_parameter.pull_off(campaign_tree(with_variants("one", *surfaces), varied=varied), study="one")
+        assert {first, f"{expected}{symbol_of('cutoff')} = 4 µm"} < set(legend(figure))
 
 
 def test_a_straight_line_and_a_power_law_are_found_exactly():
