@@ -232,11 +232,7 @@ def pull_off(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] =
     if crossed := list(filter(looks.is_beside, lines)):
         handles = looks.colour_handles() if looks.by_place else handles
         handles |= {ASPERITIES_NAME: model_handle(ASPERITIES_NAME, **_LINE | looks.fill())}
-        several = any(map(looks.rank, crossed))
-        for line in crossed:
-            name = f"{REFERENCE_NAME}, {looks.shape_name(line)}" if several else REFERENCE_NAME
-            look = {"marker": looks.cross(line, shape=_OBLIQUE)["marker"]} | _TRUTH
-            handles[name] = model_handle(REFERENCE_NAME, **look)
+        handles |= looks.cross_handles(crossed, shape=_OBLIQUE, **_TRUTH)
     say(
         fig,
         range_of_attraction(attractions_of(runs)),
@@ -353,7 +349,7 @@ def loss(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
     handles = _draw_losses(left, lines, looks)
     if truths:
         handles |= {ASPERITIES_NAME: model_handle(ASPERITIES_NAME, **looks.fill())}
-        handles |= {REFERENCE_NAME: model_handle(REFERENCE_NAME)}
+        handles |= looks.cross_handles(truths)
     else:
         left.set_title(looks.models[0], loc="right")
     say(
@@ -379,19 +375,19 @@ def _draw_losses(ax, lines, looks):
     """Draw the losses of all lines with fits; return legend entries."""
     drawn = {line: Points(found, *_LOSS) for line, found in lines.items()}
     handles = looks.handles(ls="none") if looks.many else {}
-    without_doubt = {line.contact for line in drawn if not line.doubt}
+    fitted = [line for line in drawn if not (looks.is_beside(line) or line.doubt)]
+    fitted_contacts = {line.contact for line in fitted}
     for line, points in drawn.items():
         handle, name = points.draw(ax, _look_of_loss(looks, line)), looks.name(line)
         (x, y), words = points.means, ""
-        fitted = not (looks.is_beside(line) or line.doubt)
-        if fitted and points.same_seeds and len(np.unique(x)) >= _LEAST_POINTS:
+        if line in fitted and points.same_seeds and len(np.unique(x)) >= _LEAST_POINTS:
             along = np.linspace(x.min(), x.max(), _FIT_POINTS)
             values, r_squared, exponent = fit_line(x, y, along)
             say(ax, _FIT)
             words = f": $r^2$ = {r_squared:.4f}, exponent {exponent:.2f}"
             look = {"color": looks.colour(line), "lw": 0.9, "zorder": 2}
             plot(ax, along, values, points.name._replace(curve="fitted line"), **look)
-        if not looks.many and (fitted or looks.is_beside(line) or line.contact not in without_doubt):
+        if not looks.many and (line in fitted or line.contact not in fitted_contacts):
             handles.setdefault(name + words, handle)
     means = np.concatenate([points.means for points in drawn.values()], axis=1)
     if all(values.min() > 0 and values.max() > _LOSS_SPAN * values.min() for values in means):

@@ -184,6 +184,17 @@ class Looks:
             found.pop("", None)  # the name is empty if the figure has a single surface and slope
         return {name: legend_handle(**look) for name, look in found.items()}
 
+    def cross_handles(self, lines: Iterable[Line], *, shape: str | None = None, **look: object) -> dict[str, Line2D]:
+        """Return the legend entries of the crosses of some lines by name: one for each shape of crosses.
+
+        `shape` is that of `cross`, and `look` are further arguments of `Axes.plot`.
+        """
+        lines = list(lines)
+        several = any(map(self.rank, lines))
+        names = {line: f"{REFERENCE_NAME}, {self.shape_name(line)}" if several else REFERENCE_NAME for line in lines}
+        markers = {name: self.cross(line, shape=shape)["marker"] for line, name in names.items()}
+        return {name: model_handle(REFERENCE_NAME, marker=marker, **look) for name, marker in markers.items()}
+
     def fill(self) -> dict:
         """Return the filling of a grey marker for all materials: half closed for those with and without adhesion."""
         closed = {self.adhesive(material) for material in self.materials}

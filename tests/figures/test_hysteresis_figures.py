@@ -19,7 +19,9 @@ from icha.figures import against_parameter, contact_maps, loops
 from icha.figures.against_parameter import fit_line, shares
 from icha.figures.drawn import caption_of
 from icha.figures.ensembles import Points
+from icha.figures.looks import REFERENCE_NAME
 from icha.figures.select import ContactRuns, select_unloaded_runs
+from icha.figures.style import slope_label
 
 NAMES = (("reduced_separation", "reduced_pressure"), ("reduced_pressure", "contact_area_fraction"))
 # Numbers of steps of loading.
@@ -294,6 +296,23 @@ def test_fig15_fits_nothing_through_two_loads_or_other_seeds(tree):
     figure = against_parameter.loss(campaign_tree(runs), studies=list(DEPTHS))
     assert not any("r^2" in name for name in legend(figure))
     assert np.count_nonzero(np.isfinite(figure.axes[0].containers[0][0].get_xdata())) == 3
+
+
+def test_fig15_names_the_crosses_of_boundary_elements():
+    stickier = [
+        (labels._replace(material="stickier"), run.assign(surface_energy=2 * run["surface_energy"]))
+        for labels, run in study("one", materials=("soft",), slopes=(1.0, 0.5), seeds=(1,))
+    ]
+    runs = study("one", materials=("soft",), slopes=(1.0, 0.5), seeds=(1,)) + stickier
+    # One contact is solved only with boundary elements.
+    truths = [(labels._replace(model=REFERENCE_MODEL), run) for labels, run in runs]
+    figure = against_parameter.loss(campaign_tree(runs[:-1] + truths), studies=["one"])
+    entries = dict(zip(legend(figure), figure.legends[0].get_lines(), strict=False))
+    shapes = [entries[f"{REFERENCE_NAME}, {slope_label(slope)}"].get_marker() for slope in (1.0, 0.5)]
+    crosses = [line for line in figure.axes[0].get_lines() if line.get_marker() in shapes and len(line.get_xdata())]
+    assert len(set(shapes)) == 2 and len(crosses) == 4
+    # The contact without asperities has an entry of its own, so that the legend names all colours.
+    assert sum("gamma" in name for name in entries) == 4
 
 
 def points(*runs):
