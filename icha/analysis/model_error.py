@@ -193,9 +193,10 @@ def difference_of_contacts(run: xr.Dataset, other: xr.Dataset) -> str:
         if not np.isclose(value, expected, rtol=_ROUNDING, atol=least, equal_nan=True):
             units = (run if name in run else other)[name].attrs.get("units", "1")
             return f"{name} is {value:.7g} for the run, {expected:.7g} for the other run (in {units})"
-    maps = [str(each.get("adhesion_map_kind", xr.DataArray("")).item()) for each in (run, other)]
-    if maps[0] != maps[1]:
-        return f"adhesion_map_kind is {maps[0]!r} for the run, {maps[1]!r} for the other run"
+    for name in ("adhesion_map_kind", "shape"):
+        text, expected_text = (str(each.get(name, xr.DataArray("")).item()) for each in (run, other))
+        if text != expected_text:
+            return f"{name} is {text!r} for the run, {expected_text!r} for the other run"
     return ""
 
 

@@ -16,6 +16,7 @@ from icha.figures.curves import Panel, panel_in_units
 from icha.figures.drawn import Name, plot, record, say, show_runs
 from icha.figures.looks import BRANCH_DASHES, MODEL_MARKERS, UNLOADING_MARKERS, Looks, legend_below, pale, surface_label
 from icha.figures.style import GREY, format_number, in_style, legend_handle, limits_around, new_panels, slope_label
+from icha.path.targets import LOAD_CONTROL
 
 # All slopes share a panel if there are at most this number of loops.
 _MOST_LOOPS = 4
@@ -37,6 +38,8 @@ title names. Where loading and unloading coincide, contact is reversible. Tensio
 tension in the last unloading. Sudden changes along a line are jumps of one or several spots. A straight line joins the
 states before and after a jump, as at both ends of a path, where the load is zero because there is no contact. The area
 between loading and unloading on the left is the energy lost per nominal area."""
+_UNDER_LOAD = """Under load control, more energy is lost than this area: jumps are at constant load, and not along the
+straight lines."""
 
 
 @in_style
@@ -54,9 +57,10 @@ def loops(
     Defaults are surface and seed of the first complete run. Smooth shapes are always in physical units.
     """
     runs = select.select_by_labels(select.select_unloaded_runs(campaign, study), surface=surface, seed=seed)
+    # Boundary elements of the study itself are drawn beside another model only.
+    own = runs[0][0].model == REFERENCE_MODEL and boundary_elements in (None, study)
     others = select.select_runs(campaign, boundary_elements or study, ragged=False, model=REFERENCE_MODEL)
-    shown = {labels for labels, _ in runs}
-    truths = [loop for loop in others if loop[0] not in shown and select.unloading_legs(loop[1])]
+    truths = [] if own else [loop for loop in others if select.unloading_legs(loop[1])]
     slopes = sorted({labels.rms_slope for labels, _ in runs}, reverse=True)
     own_rows = len(runs) > _MOST_LOOPS and 1 < len(slopes) < len(runs)
     drawn = [(labels, run, select.Line.of(labels, select.doubt_about_loop(run))) for labels, run in runs]
@@ -78,6 +82,7 @@ def loops(
     topography = runs_with_labels(dataset, surface=labels.surface, seed=labels.seed)
     show_runs(fig, study, runs_with_unloading(dataset), topography)
     say(fig, _LOOPS if physical else f"{_LOOPS} In reduced units, that energy is divided by E* h'rms h_rms.")
+    say(fig, _UNDER_LOAD if any(run["control"].item() == LOAD_CONTROL for _, run in runs) else "")
     say(fig, of_other_study(boundary_elements))
     for (left, *middle, right), shown_loops, window in zip(panels, by_row, windows, strict=True):
         for ax, panel in ((left, pressures), *((ax, pressures) for ax in middle), (right, areas)):

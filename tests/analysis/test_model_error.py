@@ -158,6 +158,8 @@ def test_what_cannot_be_compared_is_named():
             model_error(tree(), [(TRUTH, truth.assign({name: float(truth.get(name, 0.0)) * 1.001 or 1e-6}))])
     with pytest.raises(ValueError, match=f"{TRUTH}: adhesion_map_kind is '' for the run, 'map'"):
         model_error(tree(), [(TRUTH, truth.assign(adhesion_map_kind="map"))])
+    with pytest.raises(ValueError, match=f"{TRUTH}: shape is '' for the run, 'sphere of radius 0.001 m'"):
+        model_error(tree(), [(TRUTH, truth.assign(shape="sphere of radius 0.001 m"))])
     with pytest.raises(ValueError, match=f"{TRUTH}: seed is 1 for the run, 2 for the other run"):
         model_error(tree(), [(TRUTH, truth.assign(seed=2))])
     with pytest.raises(ValueError, match="no seed 9"):

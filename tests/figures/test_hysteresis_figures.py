@@ -173,6 +173,18 @@ def test_fig13_draws_no_boundary_elements_of_another_contact(beside):
     assert max(map(max, crosses)) == pytest.approx(float(run["reduced_pressure"].max()))
 
 
+def test_fig13_of_boundary_elements_alone_draws_none_beside_them():
+    run = loop().assign_attrs(contact_model="boundary_elements", attraction="short range")
+    own = RunLabels("hard", "boundary_elements", "rough", 1, 0.5, "soft")
+    both = campaign_tree([(own, run), (own._replace(surface="finer"), run)])
+    assert not [line for line in marks(loops.loops(both, study="hard").axes[0]) if line.get_markersize() < 4]
+
+
+def test_fig13_states_that_load_control_loses_more_than_the_area():
+    assert "Under load control" in caption_of(loops.loops(one(control="load"), study="one"))
+    assert "Under load control" not in caption_of(loops.loops(one(), study="one"))
+
+
 def test_fig14_shows_means_and_scatter_over_the_seeds(tree):
     figure = against_parameter.pull_off(tree, study="slopes", load_studies=list(DEPTHS))
     left, right = figure.axes
