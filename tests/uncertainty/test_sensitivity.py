@@ -11,7 +11,9 @@ from scipy.stats import qmc, sobol_indices
 
 from icha.datasets.campaign_file import campaign_tree
 from icha.datasets.labels import inputs_study
+from icha.datasets.variables.sensitivity import SENSITIVITY
 from icha.figures import samples
+from icha.path.targets import ESTIMATED_AT_TARGETS, ESTIMATED_OF_LOOPS
 from icha.report.answers import distribution_words, samples_table
 from icha.uncertainty.distributions import Distribution
 from icha.uncertainty.estimates import estimate_campaign
@@ -48,6 +50,10 @@ def test_indices_are_those_of_the_known_function(tree):
     assert float(row["unexplained"]) < 1e-20
     # The area depends on no other parameter, and the gap on none.
     assert set(data["degree"].values[data["response_quantity"] == "mean_gap"]) == {0}
+
+
+def test_every_estimated_quantity_has_a_variable():
+    assert {*ESTIMATED_AT_TARGETS, *ESTIMATED_OF_LOOPS} <= SENSITIVITY.keys()
 
 
 def test_cases_without_a_result_do_not_count_and_full_contact_not_for_the_infinite_stiffness():
