@@ -42,9 +42,10 @@ _FAR = 30
 _SPIKE, _USUAL_SPIKES, _NEIGHBOURS = 1.0, 30, 5
 # Smallest number of points that determine a work of adhesion.
 LEAST_POINTS = 3
-# A table is sorted if one of its columns never decreases, although another one does before the largest force: by more
-# than the first number times its range, at more than the second number times the number of points.
-_DECREASE, _DECREASES = 0.1, 0.1
+# A table is sorted if one of its columns never decreases, although another one does before the largest force. Decreases
+# of more than the first number times its range count. Their sum must exceed the second number times this range, and
+# more by the third number times the range for each point, because noise also makes decreases.
+_DECREASE, _DECREASES, _BY_NOISE = 0.07, 0.2, 0.005
 # Number of neighbours of a median; least rise of these medians in a second loading, as a share of the range of
 # the forces, and in units of the median distance of the points from them.
 _MEDIAN, _RISE, _CLEAR_RISE = 5, 0.15, 10.0
@@ -237,9 +238,9 @@ def refuse_lost_order(values: Mapping[str, np.ndarray], places: Sequence[str]) -
 
 def _sorted_column(values, top):
     """Return the column by which a table is sorted, so that the order of the test is lost; None without one."""
-    steps = {name: np.diff(column) for name, column in values.items()}
-    decreases = max(np.sum(each[:top] < -_DECREASE * np.ptp(values[name])) for name, each in steps.items())
-    is_lost = decreases >= max(LEAST_POINTS, _DECREASES * top)
+    steps = {name: np.diff(column) / (np.ptp(column) or 1.0) for name, column in values.items()}
+    decreases = [each[:top][each[:top] < -_DECREASE] for each in steps.values()]
+    is_lost = any(len(each) > 1 and -each.sum() > _DECREASES + _BY_NOISE * top for each in decreases)
     return next((name for name, each in steps.items() if is_lost and (each >= 0).all()), None)
 
 

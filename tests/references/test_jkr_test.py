@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 import icha
 from icha.boundary_elements.contact import contact_of
 from icha.cli import app
-from icha.references.jkr_tables import read_points
+from icha.references.jkr_tables import read_points, refuse_lost_order
 from icha.references.jkr_test import force_on_thin_layer
 from validation.jkr_test import exact_test, noisy_test
 
@@ -279,6 +279,25 @@ def test_a_sorted_table_has_lost_the_order_of_the_test():
             icha.fit_jkr_test(mixed, RADIUS)
     test = icha.fit_jkr_test(mixed | {"branch": branch[places]}, RADIUS)
     np.testing.assert_allclose(values(test), list(TRUTH.values()), rtol=0.15)
+
+
+@pytest.mark.parametrize("noise", [0.005, 0.01])
+def test_most_short_sorted_tables_are_refused_and_few_tables_of_loading(noise):
+    """With 16 to 40 points; loading under load control has forces without noise, which look sorted."""
+    rng, refused = np.random.default_rng(3), {"sorted": 0, "loading": 0}
+    for _ in range(40):
+        truth = {"radius": RADIUS, "receding": rng.uniform(0.06, 0.2), "points": int(rng.integers(16, 40))}
+        states = exact_test(**truth)
+        size = noise * np.abs(states["indentation"]).max()
+        states["indentation"] = states["indentation"] + size * rng.standard_normal(len(states["force"]))
+        loading = np.arange(truth["points"] // 2)
+        for name, places in {"sorted": np.argsort(states["force"], kind="stable"), "loading": loading}.items():
+            table = {quantity: states[quantity][places] for quantity in ("force", "indentation")}
+            try:
+                refuse_lost_order(table, [""] * len(places))
+            except ValueError:
+                refused[name] += 1
+    assert refused["sorted"] >= 36 and refused["loading"] <= 1
 
 
 def test_implausible_fits_are_refused_or_warned_of():
