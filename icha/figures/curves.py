@@ -20,8 +20,8 @@ from icha.figures.looks import BRANCH_DASHES, MODEL_MARKERS, Looks, model_handle
 from icha.figures.style import GREY, legend_handle, logarithmic_axes
 from icha.support.formatting import choose_unit
 
-_COMMON = """Means are at common loads. Between the computed states of each seed, monotone cubic polynomials of the
-logarithm of the load interpolate."""
+_COMMON = """Means are at common loads. Between the targets of each seed, monotone cubic polynomials of the
+logarithm of the load interpolate; states between the targets are not drawn on loading."""
 _UNLOADING = {"ls": BRANCH_DASHES["unloading"], "lw": 0.7, "zorder": 2.2}
 # A value counts as a rounding error if it is at most this fraction of the largest value.
 _ROUNDING = 1e-7

@@ -185,11 +185,11 @@ def test_lines_about_directions_and_factors_beside_points(tmp_path):
     path = written(tmp_path, text(points(), ",", heading), "scan.txt")
     with refused("lateral_unit", "also 'Magnification: 2', which may change it"):
         read(path, size=None)
-    for line in ("Inverted: yes", "Z inverted", "Positive: down"):
+    for line in ("Inverted: yes", "Z inverted", "Positive: down", "Invert Z: true", "Invertiert: ja", "Flip Z: yes"):
         path = written(tmp_path, text(rows(), " ", [line]))
         with refused("touches_first", re.escape(line)):
             read(path)
-    assert_heights(read(written(tmp_path, text(rows(), " ", ["Inverted: no"]))))
+    assert_heights(read(written(tmp_path, text(rows(), " ", ["Inverted: no", "Invertiert: nein", "Invert Z: false"]))))
 
 
 def test_lines_that_change_nothing_are_not_asked_about(tmp_path):

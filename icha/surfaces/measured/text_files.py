@@ -99,7 +99,10 @@ _MEANINGS = {name: meaning for meaning, names in _NAMES.items() for name in name
 # An entry that states in which direction the numbers increase.
 _DIRECTION = re.compile(r"\bz\b.*(axis|direction|achse)|polarity|positive|height direction")
 # A line by which the numbers are inverted, or are depths.
-_INVERTED = re.compile(rf"\binverted\b(?!\s*[:=]?\s*(?:no|0|off|false|none)\b)|{DEPTHS}", re.IGNORECASE)
+_INVERTED = re.compile(
+    rf"\b(?:inver[st]|flip)\w*\b(?!\s*z?\s*[:=]?\s*(?:no|non|nein|0|off|false|none)\b)|{DEPTHS}",
+    re.IGNORECASE,
+)
 # Number for a missing height in grids by ESRI, if the heading does not define another number.
 _ESRI_MISSING = -9999.0
 
