@@ -7,7 +7,6 @@ import math
 import subprocess
 import tempfile
 import time
-import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path as File
 
@@ -47,9 +46,7 @@ def rough_sphere(
 def _timed_loop(surface, indentation):
     """Return a row with the computing time of a loop to an indentation (m), and the run."""
     clock, path = time.process_time(), Path(indentations=[indentation], unload=True)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        run = simulate(surface, ADHESIVE, path, model="boundary_elements")
+    run = simulate(surface, ADHESIVE, path, model="boundary_elements")
     seconds, pull_off = time.process_time() - clock, -float(run.nominal_pressure.min()) * surface.period**2 / PULL_OFF
     return {"grid": surface.grid, "steps": run.sizes["step"], "seconds": seconds, "pull_off": pull_off}, run
 

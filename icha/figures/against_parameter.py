@@ -73,7 +73,7 @@ def tabor(campaign: xr.DataTree, *, study: str, kind: str | None = None, target:
     state = select.kind_and_target(dataset, find_snapshot(dataset, kind, target))
     # Materials that differ only in the range of attraction form one line with the name of the first material.
     materials: dict[Interface, str] = {}
-    interfaces = interfaces_of([campaign[study].to_dataset()])
+    interfaces = interfaces_of([dataset])
     curves: dict[select.Line, list[select.ContactRuns]] = {}
     bare: dict[select.Line, list[select.ContactRuns]] = {}
     for group in groups:
@@ -96,8 +96,9 @@ def tabor(campaign: xr.DataTree, *, study: str, kind: str | None = None, target:
     fig, [panels] = new_panels(3.1)
     quantities = ("contact_area_fraction", gap_name(dataset))
     say(fig, _RANGES, _TABOR)
-    model, *others = sorted(dataset["model"].values, key=groups[0].labels.model.__ne__)
-    left_out = "".join(f"; {MODELS[other].words} of the study are left out" for other in others)
+    model = groups[0].labels.model
+    others = [MODELS[each].words for each in dataset["model"].values if each != model]
+    left_out = "".join(f"; {words} of the study are left out" for words in others)
     say(fig, f"Curves are of {MODELS[model].words}{left_out}.")
     show_runs(fig, study, runs_with_snapshot(dataset, *state), dataset["model"] == model)
     drawn = []

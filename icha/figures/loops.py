@@ -38,8 +38,8 @@ title names. Where loading and unloading coincide, contact is reversible. Tensio
 tension in the last unloading. Sudden changes along a line are jumps of one or several spots. A straight line joins the
 states before and after a jump, as at both ends of a path, where the load is zero because there is no contact. The area
 between loading and unloading on the left is the energy lost per nominal area."""
-_UNDER_LOAD = """Under load control, more energy is lost than this area: jumps are at constant load, and not along the
-straight lines."""
+_UNDER_LOAD = """Under load control, more energy is lost than this area, because the load is constant in a jump and does
+not follow the straight line."""
 
 
 @in_style

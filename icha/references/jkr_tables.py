@@ -42,9 +42,9 @@ _FAR = 30
 _SPIKE, _USUAL_SPIKES, _NEIGHBOURS = 1.0, 30, 5
 # Smallest number of points that determine a work of adhesion.
 LEAST_POINTS = 3
-# A table is sorted if one of its columns never decreases, although another one does before the largest force. Decreases
-# of more than the first number times its range count. Their sum must exceed the second number times this range, and
-# more by the third number times the range for each point, because noise also makes decreases.
+# A table is sorted if one of its columns never decreases, although another one does before the largest force. All
+# three numbers are in units of the range of this other column. Only decreases larger than the first number count. Their
+# sum must be larger than the second number plus, because of noise, the third number times the number of points.
 _DECREASE, _DECREASES, _BY_NOISE = 0.07, 0.2, 0.005
 # Number of neighbours of a median; least rise of these medians in a second loading, as a share of the range of
 # the forces, and in units of the median distance of the points from them.

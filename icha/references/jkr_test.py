@@ -251,11 +251,12 @@ def _without_contact(force, unloading):
     return left_out
 
 
-def force_on_thin_layer(ratio: float) -> float:
-    """Return by how much a bonded, incompressible layer increases the force on a sphere at an indentation, as a part.
+def force_increase_by_layer(ratio: float) -> float:
+    """Return the force on a sphere on a bonded, incompressible layer over that on a half-space, minus 1.
 
-    The first order in the contact radius over the thickness, `ratio`, is that of E. K. Dimitriadis et al., Biophys. J.
-    82 (2002) 2798. The second is fitted to boundary elements without adhesion up to a ratio of 2, to 6 %.
+    Both forces are for the same indentation, and `ratio` is the contact radius over the thickness of the layer. The
+    first order in this ratio is that of E. K. Dimitriadis et al., Biophys. J. 82 (2002) 2798. The second order is
+    fitted to boundary elements without adhesion; up to a ratio of 2, the fit is within 6 %.
     """
     return ratio * (1.133 + 1.2 * ratio)
 
@@ -302,7 +303,7 @@ def _warnings(test, errors, interaction_range, thickness, roughness) -> Iterator
             f"paraboloid, and on a sphere the force without adhesion is {100 * error:.1f} % larger; use smaller loads"
         )
     ratio = largest / thickness
-    if (error := force_on_thin_layer(ratio)) > _FORCE_ERROR:
+    if (error := force_increase_by_layer(ratio)) > _FORCE_ERROR:
         yield (
             f"the contact radius is up to {ratio:.2g} times the thickness: on a bonded, incompressible layer, the "
             f"force at an indentation is about {100 * error:.0f} % larger than on a half-space; use thicker samples or "

@@ -12,7 +12,7 @@ import icha
 from icha.boundary_elements.contact import contact_of
 from icha.cli import app
 from icha.references.jkr_tables import read_points, refuse_lost_order
-from icha.references.jkr_test import force_on_thin_layer
+from icha.references.jkr_test import force_increase_by_layer
 from validation.jkr_test import exact_test, noisy_test
 
 TRUTH = {"contact_modulus": 1.8e6, "advancing_work": 0.03, "receding_work": 0.09}
@@ -185,7 +185,7 @@ def test_the_force_on_a_thin_layer_is_that_of_boundary_elements(thickness):
     state = contact.equilibrium(contact.untouched(), -indentation)
     radius = np.sqrt(contact.area_fraction(state) * contact.area / np.pi)
     force = contact.pressure(state) * contact.area / (4 / 3 * size**3)
-    assert 1 + force_on_thin_layer(radius / (thickness * size)) == pytest.approx(force, rel=0.03)
+    assert 1 + force_increase_by_layer(radius / (thickness * size)) == pytest.approx(force, rel=0.03)
 
 
 @pytest.mark.parametrize(
