@@ -67,7 +67,7 @@ def tabor(campaign: xr.DataTree, *, study: str, kind: str | None = None, target:
     """
     runs = select.select_runs(campaign, study, ragged=False)
     if all(float(run.get("pull_off_force_over_jkr", 0)) and run["short_wavelength"] == np.inf for _, run in runs):
-        return _pull_off_of_spheres([run for _, run in runs])
+        return _pull_off_of_spheres(campaign[study].to_dataset(), runs)
     groups = select.group_by_contact(campaign, runs)
     dataset = campaign[study].to_dataset()
     state = select.kind_and_target(dataset, find_snapshot(dataset, kind, target))
@@ -137,8 +137,9 @@ def _shade_unverified(ax, smallest):
     ax.set_ylim(0.95 * bottom, 1.05 * top)
 
 
-def _pull_off_of_spheres(runs):
+def _pull_off_of_spheres(study, runs):
     """Draw pull-off force and loss of smooth spheres against the Tabor parameter, with the limits of JKR and DMT."""
+    labels, runs = runs[0][0], [run for _, run in runs]
     runs = sorted(runs, key=lambda run: float(run["tabor_parameter"]))
     names = ("tabor_parameter", "pull_off_force", "hysteresis_loss", "surface_energy", "shape_radius")
     names += ("contact_modulus", "period")
@@ -149,10 +150,12 @@ def _pull_off_of_spheres(runs):
     fig, [panels] = new_panels(3.1)
     say(
         fig,
-        "Pull-off force (a) and energy lost from first contact to separation (b) of smooth spheres.",
+        f"Pull-off force (a) and energy lost from first contact to separation (b) of smooth spheres, by "
+        f"{MODELS[labels.model].words}.",
         _TABOR,
         "The theory of Maugis is for a constant attraction; JKR and DMT are its limits.",
     )
+    show_runs(fig, labels.study, runs_with_loop(study, "hysteresis_loss"), study["model"] == labels.model)
     for ax, values in zip(panels, (pull_off, loss), strict=True):
         ax.plot(at, values, color=GREY, lw=0.6, zorder=1)
         for chosen, fill, label in ((resolved, "C0", FINITE_RANGE), (~resolved, "white", SHORT_RANGE)):

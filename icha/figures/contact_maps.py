@@ -45,6 +45,8 @@ from icha.figures.style import (
 )
 from icha.support.formatting import choose_unit, format_quantity
 
+# Forces below this part of the largest one of a run are zero.
+_NO_FORCE = 1e-6
 # Colour of spots, and of events that break or separate spots.
 _RED = (0.9, 0.0, 0.05)
 
@@ -132,7 +134,7 @@ def contact_map(
     elif select.has_shape(data):
         say(fig, "The heights are those of the shape with its roughness.")
     load = rf"$F/(E^{{\ast}}h′_{{\mathrm{{rms}}}}A_0)$ = {format_number(float(state['reduced_pressure']))}"
-    title = f"{run_label(campaign, labels)}, {_name_force(state) or load}"
+    title = f"{run_label(campaign, labels)}, {_name_force(data, at) or load}"
     fig.suptitle(f"{title}\n{select.doubt_about(data)}".rstrip(), fontsize="medium")
     for ax in panels.ravel():
         topography.label(ax)
@@ -297,8 +299,7 @@ def snap_map(campaign: xr.DataTree, surface: xr.Dataset, *, run: Sequence) -> Fi
     say(fig, _EVENTS, grid_of_loops(campaign, [labels.study]))
     handles = _draw_places(where, topography_of(data, surface), events)
     _draw_counts(when, events)
-    material = material_labels(interfaces_of([campaign[labels.study].to_dataset()]))[labels.material]
-    when.set_title(f"{material}, {slope_label(labels.rms_slope)}", loc="right", fontsize="small")
+    fig.suptitle(run_label(campaign, labels), fontsize="medium")
     handles |= {name: legend_handle(color=GREY, ls=dashes, lw=1.1) for name, dashes in BRANCH_DASHES.items()}
     if doubt := select.doubt_about_loop(data):
         handles |= {doubt: legend_handle(ls="none")}
@@ -436,7 +437,7 @@ def _branch(maps, snapshot):
 def _name_state(maps, snapshot):
     """Return load and area of a snapshot as text, with the branch if it is not loading; on a free square, the force."""
     step, name = int(maps["snapshot_step"].values[snapshot]), _branch(maps, snapshot)
-    if force := _name_force(maps.isel(step=step)):
+    if force := _name_force(maps, snapshot):
         return f"{name}, {force}"
     load = format_number(float(f"{float(maps['reduced_pressure'][step]):.3g}"))
     area = format_number(float(f"{float(maps['contact_area_fraction'][step]):.2g}"))
@@ -444,9 +445,12 @@ def _name_state(maps, snapshot):
     return words if name == "loading" else f"{name}, {words}"
 
 
-def _name_force(state):
-    """Return the force of a state on a free square as text; "" on a periodic surface, where a pressure is stated."""
-    if "force" not in state:
+def _name_force(run, snapshot):
+    """Return the force at a snapshot on a free square as text; "" on a periodic surface, where a pressure is stated."""
+    if "force" not in run:
         return ""
-    force = float(f"{float(state['force']):.3g}")
-    return f"$F$ = {format_quantity(force, 'N')}".replace("-", "−")
+    forces = run["force"].values
+    force = float(forces[int(run["snapshot_step"].values[snapshot])])
+    # A target of no force is met to the tolerance of loads.
+    force = force if abs(force) > _NO_FORCE * np.abs(forces).max() else 0.0
+    return f"$F$ = {format_quantity(float(f'{force:.3g}'), 'N')}".replace("-", "−")

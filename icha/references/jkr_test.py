@@ -54,7 +54,10 @@ class Estimate(NamedTuple):
     def text(self, unit: str) -> str:
         """Return value and interval with a prefixed unit, such as `31 mJ/m², 90 % interval 29 to 33 mJ/m²`."""
         factor, name = choose_unit(max(map(abs, self)), unit)
-        value, low, high = (f"{each * factor:.3g}" for each in self)
+        # The ends of a narrow interval need more than three digits to differ.
+        low, high = factor * self.low, factor * self.high
+        digits = next((n for n in range(3, 6) if f"{low:.{n}g}" != f"{high:.{n}g}"), 6)
+        value, low, high = (f"{each * factor:.{digits}g}" for each in self)
         return f"{value} {name}, {100 * PROBABILITY:.0f} % interval {low} to {high} {name}"
 
 
@@ -266,8 +269,12 @@ def _warnings(test, errors, interaction_range, thickness, roughness) -> Iterator
     modulus, advancing = test.contact_modulus.value, test.advancing_work.value
     unloading, largest = np.isin(test.used_for, ["stuck", "receding"]), test.loop.stuck_radius
     work = max(advancing, test.receding_work.value if test.receding_work else 0.0)
-    yield from unusual_arguments({"radius": test.radius, "contact_modulus": modulus, "surface_energy": work})
-    if 0 < work < _LEAST_WORK:
+    seen = any(each and each.low for each in (test.advancing_work, test.receding_work))
+    fitted = {"radius": test.radius, "contact_modulus": modulus} | ({"surface_energy": work} if seen else {})
+    yield from unusual_arguments(fitted)
+    if not seen:
+        yield "the points show no adhesion: intervals of the work of adhesion begin at 0"
+    elif work < _LEAST_WORK:
         yield (
             f"the work of adhesion, {1e3 * work:.2g} mJ/m², is less than {1e3 * _LEAST_WORK:g} mJ/m²; expected 10 to "
             "200 mJ/m² between smooth surfaces. Check the units of the radius and of the columns"
@@ -309,7 +316,7 @@ def _warnings(test, errors, interaction_range, thickness, roughness) -> Iterator
             f"force at an indentation is about {100 * error:.0f} % larger than on a half-space; use thicker samples or "
             "smaller loads"
         )
-    if work:
+    if seen:
         energy = advancing or work
         if short := describe_short_range(
             float(Material(modulus, energy, interaction_range).tabor_parameter(test.radius))

@@ -293,11 +293,6 @@ class Surface:
         """Elastic energy of full contact with a half-space per area, divided by E*: 1/4 sum q |h_q|^2, m."""
         return self.full_contact().energy
 
-    @property
-    def complete_contact_pressure(self) -> float:
-        """Nominal pressure, divided by E*, of complete contact with a half-space without adhesion."""
-        return self.full_contact().complete_pressure
-
     def scaled_to_rms_slope(self, rms_slope: float) -> Surface:
         """Return the surface with heights scaled to the rms slope `rms_slope`; a smooth surface is not scaled."""
         if self.smooth:

@@ -268,6 +268,11 @@ def test_fig4_draws_the_cells_of_boundary_elements_on_the_shape(tmp_path):
     )
     assert "Contact of boundary elements" in caption_of(fig) and "asperity" not in caption_of(fig)
     assert "$F$ = " in fig.get_suptitle() and "mathrm{rms}}A_0" not in fig.get_suptitle()
+    # The solver meets a target of no force to its tolerance.
+    run, surface = run.copy(deep=True), read_dataset(tmp_path / "s.nc")
+    run["force"].values[run["snapshot_step"].values[0]] = -1e-9 * run["force"].values.max()
+    unloaded = contact_maps.contact_map(tree_of(run), surface, run, run=labels, kind="indentation")
+    assert "$F$ = 0 N" in unloaded.get_suptitle()
     # The frame contains the contact.
     columns = np.flatnonzero(cells.any(axis=0)) / GRID * SIDE * 1e6
     left, right = fig.axes[1].get_xlim()

@@ -12,7 +12,7 @@ import icha
 from icha.boundary_elements.contact import contact_of
 from icha.cli import app
 from icha.references.jkr_tables import read_points, refuse_lost_order
-from icha.references.jkr_test import force_increase_by_layer
+from icha.references.jkr_test import Estimate, force_increase_by_layer
 from validation.jkr_test import exact_test, noisy_test
 
 TRUTH = {"contact_modulus": 1.8e6, "advancing_work": 0.03, "receding_work": 0.09}
@@ -315,6 +315,17 @@ def test_implausible_fits_are_refused_or_warned_of():
         table = noisy_test(states, np.random.default_rng(1), COLUMNS[column:][:1])
         test = icha.fit_jkr_test(table, RADIUS, indentation_offset=0.0)
         assert any("times the pull-off force: noise hides the adhesion" in text for text in test.warnings) == warned
+
+
+def test_points_without_adhesion_are_said_to_show_none():
+    radius = np.concatenate([np.linspace(20e-6, 100e-6, 20), np.linspace(98e-6, 15e-6, 20)])
+    hertz = {"force": 4 * 1e6 * radius**3 / (3 * RADIUS), "contact_radius": radius}
+    for table in (hertz, noisy_test(hertz, np.random.default_rng(1), COLUMNS[:1])):
+        test = icha.fit_jkr_test(table, RADIUS)
+        assert "the points show no adhesion: intervals of the work of adhesion begin at 0" in test.warnings
+        assert not any("Check the unit" in text or "Maugis" in text for text in test.warnings)
+    narrow = Estimate(1e6, 0.99999e6, 1.00001e6).text("Pa")
+    assert narrow == "1 MPa, 90 % interval 0.99999 to 1 MPa"
 
 
 def test_intervals_do_not_depend_on_wrong_ratios_of_errors():
