@@ -89,13 +89,13 @@ class Table:
 
     def unknown(self):
         """A heading of no known format, with or without a size that a person understands."""
-        heading = list(self.random.permutation(USELESS)[:3])
+        heading = list(self.random.permutation(USELESS)[: self.random.integers(3)])
         self.stated = self.random.random() < 0.6
         if self.stated:
             size = f"Scan size: {self.side(0):g} um x {self.side(1):g} um"
             pixel = "Pixel size = {:g} um x {:g} um".format(*self.cell)
             heading.insert(1, str(self.random.choice([size, pixel])))
-            self.stated = self.cell == (0.5, 0.5)
+            self.stated = self.cell == (0.5, 0.5) and len(heading) == 1
         self.write([*heading, "Z unit: nm", f"Lines: {len(self.heights)}"], self.rows())
 
     def gwyddion(self):

@@ -151,32 +151,20 @@ def test_factors_of_heights_in_headings_are_asked_about(tmp_path, entry):
     with refused("height_unit", "may be a factor of the heights"):
         read(path, height_unit=None)
     assert "not applied: " in read(path).reading
-    assert_heights(read(written(tmp_path, text(rows(), " ", ["Z scale: 1.0", "Z unit: nm"])), height_unit=None))
 
 
-# Lines that may change the size, the heights, or both.
-OF_SIZE = (
-    "Line spacing: 1 um|Pixel aspect ratio: 2|Binning: 2x2|Decimation: every 2nd point|every second line is left out"
-)
-OF_SIZE += "|Transposed: yes|Columns along y"
-OF_SIZE += (
-    "|Downsampled|Stride: 2 pixels|Skip: one pixel|Skipped lines: 1|Number of skipped points: 3|Decimation rate: 4"
-)
-OF_HEIGHTS = "Z increment: 0.1 nm|Heights x10|Heights times ten|Z zoom: 10x|Überhöhung: 10-fach|log10 of heights"
-OF_HEIGHTS += "|Comment: heights multiplied by 10|Height channel: x10"
-OF_BOTH = "Conversion: 0.1|Values x 10|BAD = 0|Zoom: 50%|half resolution|Multiplied by ten|Normalized to rms = 1"
-OF_BOTH += "|Title: scaled by 10|Filtered, mean 2x2|Average: 2x2"
+# Lines that change the size or the heights, or nothing: only a person knows.
+UNKNOWN = "Line spacing: 1 um|Binning: 2x2|every second line is left out|Transposed: yes|Downsampled|Heights times ten"
+UNKNOWN += "|Z zoom: 10x|log10 of heights|Comment: heights x 10|Units: x10|Normalized to rms = 1|Objective: 50x|Pixels 4um"
+UNKNOWN += "|Lines: 24, every second one left out|Unit: nm, one half|Topography"
 
 
-@pytest.mark.parametrize("line", f"{OF_SIZE}|{OF_HEIGHTS}|{OF_BOTH}".split("|"))
-def test_lines_that_may_change_size_and_heights_are_asked_about(tmp_path, line):
+@pytest.mark.parametrize("line", UNKNOWN.split("|"))
+def test_a_heading_with_a_line_that_is_not_known_is_asked_about(tmp_path, line):
     path = written(tmp_path, text(rows(), " ", ["Pixel: 0.5 um", "Z unit: nm", line]), "scan.txt")
-    for key, others in (("size", OF_HEIGHTS), ("height_unit", OF_SIZE)):
-        if line in others.split("|"):
-            assert_heights(read(path, **{key: None}))
-        else:
-            with refused(key, f"also {re.escape(repr(line))}, which may change it|may be a factor"):
-                read(path, **{key: None})
+    for key in ("size", "height_unit"):
+        with refused(key, f"also {re.escape(repr(line))}, which may change it"):
+            read(path, **{key: None})
     assert_heights(read(path))
 
 
@@ -192,17 +180,9 @@ def test_lines_about_directions_and_factors_beside_points(tmp_path):
     assert_heights(read(written(tmp_path, text(rows(), " ", ["Inverted: no", "Invertiert: nein", "Invert Z: false"]))))
 
 
-def test_lines_that_change_nothing_are_not_asked_about(tmp_path):
-    lines = [
-        "Binning: 1 x 1",
-        "Sampling rate: 100 Hz",
-        "Objective: 50x",
-        "Setpoint: 20 nm",
-        "Nx: 24",
-        "Size: 24 x 24 px",
-    ]
-    path = written(tmp_path, text(rows(), " ", ["Pixel: 0.5 um", "Z unit: nm", *lines]))
-    assert_heights(read(path, size=None, height_unit=None))
+def test_a_heading_of_known_entries_is_read(tmp_path):
+    heading = ["Pixel: 0.5 um", "Z unit: nm", "Nx: 24", "Size: 24 x 24 px", "# ----"]
+    assert_heights(read(written(tmp_path, text(rows(), " ", heading)), size=None, height_unit=None))
 
 
 @pytest.mark.parametrize(

@@ -23,6 +23,8 @@ from icha.surfaces.measured.settings import (
 )
 from icha.surfaces.measured.text_tables import Layout, SourceFile, refuse_coordinates, strip_remark
 
+# Beginning of the heading of text files by Zygo.
+_ZYGO = "Zygo "
 # Fewest columns of a table with a row of heights in every line.
 _FEWEST_COLUMNS = 8
 # Title of a column: its name and its unit, in brackets or after a sign.
@@ -67,34 +69,9 @@ _NAMES = {
     "|no data value|missing value|missing data value|bad value|bad data|invalid"
     "|invalid value|invalid data|invalid height|void value|null value|fill value|fillvalue",
 }
-# Names of lines about the measurement whose numbers change neither size nor heights. Values of other lines that change
-# nothing: a factor of 1, frequencies, times, voltages and temperatures.
-_REMARKS = re.compile(
-    r"\b(?:date|time|datum|uhrzeit|heure|version|serial|operator|user|file|name|comment|title|id|no|nr|number"
-    r"|temperature|channel|[ip] gain|rate|speed|samples|average|objective|setpoint|tip|stage)\b"
-)
-_NEUTRAL = re.compile(r"1(?:[.,]0*)?(?:\s*[x×*]\s*1)?|[\d.,]+\s*(?:[kM]?Hz|m?s|m?V|°?C|K|rpm)")
-# Meanings of lines with lengths along the surface, and the largest unit of heights, m.
-_LATERAL, _COARSEST = ("size", "pixel", "width", "height", "dx", "dy", "distance of points"), 1e-3
-# Words about points that were left out or united, such as 2x2, about magnified or converted numbers, and factors such
-# as x10.
-_CHANGES = re.compile(
-    r"binning|decimat|thinned|thinning|skip|\bevery (?:other|second|third|\S*\d)|sampling|sub-?sampl|down-?sampl"
-    r"|reduc|stride|(?<!\d)[2-9]\s?[x×]\s?[2-9](?!\d)|\bstep\s*[:=]|\bhal(?:f|ved)\b|doubl|zoom|scal(?:ed?|ing)\b|magnif"
-    r"|factor|multipli(?:ed|cation)|\btimes\b|exag|überhöh|\d[ -]?(?:fold|fach)\b|^[^\d]*\s[x×*]\s*\d"
-    r"|\bunits? of\s*\d|transpos|\balong [xy]\b|normali[sz]|\blog\d*\b(?!\s*[:=])|\bln\b|logarithm",
-    re.IGNORECASE,
-)
-# Words of lines about the heights alone, and about the points alone.
-_ABOUT = {
-    "height_unit": re.compile(r"(?:^|[^\w])z\b|height|vertical|überhöh", re.IGNORECASE),
-    "size": re.compile(
-        r"transpos|\balong\b|lateral|\bxy?\b(?!\s*\d)|pixel|\bpx\b|\blines?\b|point|spacing|sampl|binning|decimat",
-        re.IGNORECASE,
-    ),
-}
-# A number alone, or a number and a unit of length.
-_VALUE = re.compile(rf"{_NUMBER}\s*(\S*)")
+_KNOWN = {*_NAMES, "dx", "dy", "distance of points"}
+# A word, a number with or without a unit, or two of them, such as 24 x 24 px.
+_PLAIN = re.compile(rf"(?:{_NUMBER}\s*)?\S*(?:\s*[x×*]\s*{_NUMBER}\s*\S*)?")
 _MEANINGS = {name: meaning for meaning, names in _NAMES.items() for name in names.split("|")}
 # An entry that states in which direction the numbers increase.
 _DIRECTION = re.compile(r"\bz\b.*(axis|direction|achse)|polarity|positive|height direction")
@@ -112,7 +89,7 @@ def format_of_text(file: SourceFile) -> str:
     layout = file.layout
     if layout is None:
         return "instrument"
-    titles = _find_titles(layout)
+    titles, _ = _find_titles(layout)
     if _read_titles(titles)[0]:
         return "xyz"
     if sum(bool(_QUANTITIES.search(title)) for title in titles) > 1:
@@ -131,7 +108,7 @@ def format_of_text(file: SourceFile) -> str:
 def read_matrix(file: SourceFile, settings: Preparation) -> FileContent:
     """Read a text file with a row of heights in every line; units, size and missing heights come from its heading."""
     (heights, _, ends_with_delimiters), heading = file.table, _Heading(file.table_layout)
-    if "".join(heading.lines[:1]).startswith("Zygo "):
+    if "".join(heading.lines[:1]).startswith(_ZYGO):
         raise UnfitTopography("is a Zygo file without points x y z; expected another export, such as XYZ")
     file.refuse_blocks()
     if not (heading.agrees_with(heights.shape) or heading.is_image):
@@ -149,7 +126,7 @@ def read_matrix(file: SourceFile, settings: Preparation) -> FileContent:
 def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
     """Read a text file with a point x y z in every line; points may be in any order or missing."""
     layout = file.table_layout
-    table, titles = file.table[0], _find_titles(layout)
+    table, (titles, _) = file.table[0], _find_titles(layout)
     count = table.shape[1]
     titled, units = _read_titles(titles)
     columns = list(settings.columns or titled or (1, 2, 3))
@@ -204,9 +181,9 @@ def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
     named = "columns x {}, y {}, z {} by their names".format(*columns)
     remarks = named if titled and columns != sorted(columns) else "", heading.unused_factors(settings)
     if x_unit and y_unit and settings.lateral_unit is None:
-        heading.ask_about_unread_line("lateral_unit", "the units of x and y")
+        heading.ask_beside_unknown_lines("lateral_unit", "the units of x and y")
     if z_unit and settings.height_unit is None:
-        heading.ask_about_unread_line("height_unit", "the unit of z")
+        heading.ask_beside_unknown_lines("height_unit", "the unit of z")
     size = (nx * dx * x_unit, ny * dy * y_unit) if x_unit and y_unit and settings.lateral_unit is None else None
     return FileContent(
         heights.reshape(ny, nx),
@@ -240,16 +217,20 @@ def _interpolate(points):
 
 
 def _find_titles(layout):
-    """Return the words above the numbers, one for each column, and units in a line of their own; [] without titles."""
+    """Return the words above the numbers, one for each column, and the number of their lines; [] without titles.
+
+    Units may be in a line of their own.
+    """
     delimiters = r"[,;\t]" if layout.delimiter != " " else r"[,;]\s*|(?<=[\])])\s+|\s+(?![\[(])"
     names, last = (
         [word.strip(" \"'") for word in re.split(delimiters, line.strip(' \t\r\n,;#%"')) if not re.search("[:=]", line)]
         for line in ("", "", *layout.heading)[-2:]
     )
     units = [word.strip("[]()") for word in last]
-    if len(names) == len(last) and sum(metres_of(unit) is not None for unit in units) > 2:
+    of_units = len(names) == len(last) and sum(metres_of(unit) is not None for unit in units) > 2
+    if of_units:
         last = [f"{name} [{unit}]" for name, unit in zip(names, units, strict=True)]
-    return last if len(last) == layout.columns else []
+    return (last, 1 + of_units) if len(last) == layout.columns else ([], 0)
 
 
 def _read_titles(titles):
@@ -274,15 +255,19 @@ class _Heading:
         """Find the entries of a heading: meaning of the name, value, and line."""
         self.lines, self.decimal = layout.heading, layout.decimal
         self.entries: list[tuple[str, str, str]] = []
-        names, previous = set(), ("", "")
-        for line in self.lines:
+        names, previous, unknown = set(), ("", ""), []
+        of_titles = _find_titles(layout)[1]
+        for k, line in enumerate(self.lines, of_titles - len(self.lines)):
             if not (found := _ENTRY.match(line.replace('"', ""))):
+                unknown += [line] if k < 0 and re.search(r"\w", line) else []
                 continue
             name = re.sub(r"[\s_.-]+", " ", found[1].lower()).strip()
             # A delimiter may stand between a number and its unit.
             value = re.sub(r"(?<=\d)\s*[,;\t]\s*(?=[^\W\d])", " ", found[2])
             meaning = _MEANINGS.get(name, name)
             self.entries.append((meaning, value, line))
+            plain = metres_of(value) if "unit" in meaning else _PLAIN.fullmatch(value)
+            unknown += [] if k >= 0 or (meaning in _KNOWN and plain) else [line]
             # The height of an image follows its width; elsewhere it may be a height of the surface.
             if (previous[0], meaning) in (("width", "height"), ("dx", "dy")):
                 self.entries.append(("size" if meaning == "height" else "pixel", f"{previous[1]} x {value}", line))
@@ -292,41 +277,27 @@ class _Heading:
         # The heading of an image that Gwyddion exported.
         image = ["width", "height", "value units"]
         self.is_image = image == [each for each, _, line in self.entries if line.startswith("#") and each in image]
+        is_points = ["lateral units", "value units"] == [each for each, *_ in self.entries if each in _KNOWN]
         is_keyence = not names.isdisjoint({"xy calibration", "xy justierung"})
-        self.is_known = self.is_grid or self.is_image or is_keyence
+        is_zygo = "".join(self.lines[:1]).startswith(_ZYGO)
+        # Lines of a heading of no known format that ICHA does not know.
+        self.unknown = [] if self.is_grid or self.is_image or is_points or is_keyence or is_zygo else unknown
 
     def values(self, *meanings: str) -> list[str]:
         """Return the values of the entries with these meanings."""
         return [value for meaning, value, _ in self.entries if meaning in meanings]
 
-    def ask_about_unread_line(self, key: str, stated: str) -> None:
-        """Raise UnfitTopography if a heading of no known format has a line that may change what it states for a key.
+    def ask_beside_unknown_lines(self, key: str, stated: str) -> None:
+        """Raise UnfitTopography if a heading of no known format has a line that ICHA does not know.
 
-        Such lines state a number alone or a length under a name that ICHA does not know, such as a line spacing,
-        binning or factor of the heights; or they have words such as in `_CHANGES`. Lines about the heights alone do not
-        change the size, and the reverse.
+        Such a line may change what the heading states for a key, as a line spacing, binning or factor of heights does.
         """
-        entries = {line: (name, value) for name, value, line in reversed(self.entries)}
-        for line in () if self.is_known else self.lines:
-            name, value = entries.get(line, ("", ""))
-            found = _VALUE.match(value)
-            if name in (*_NAMES, "dx", "dy", "distance of points"):
-                continue
-            # One line skipped leaves out every second line.
-            changes = _CHANGES.search(line) and (not _NEUTRAL.fullmatch(value) or re.search("normali|skip", name))
-            number = found and (not found[2] or metres_of(found[2]) or found[2][0] in "xX×*")
-            number = number and not (_REMARKS.search(name) or _NEUTRAL.fullmatch(value))
-            about = [each for each, words in _ABOUT.items() if words.search(line)]
-            if (number or changes) and (len(about) != 1 or key.replace("lateral_unit", "size") in about):
-                self._ask(key, stated, line)
-
-    def _ask(self, key, stated, line):
-        """Raise UnfitTopography because a line of the heading may change what the heading states for a key."""
-        raise UnfitTopography(
-            f"is missing; the heading states {stated!r}, but also {line.strip()[:60]!r}, which may change it. "
-            "Give the value for the table of numbers in this key",
-            key,
-        )
+        if self.unknown:
+            raise UnfitTopography(
+                f"is missing; the heading states {stated!r}, but also {self.unknown[0].strip()[:60]!r}, which may "
+                "change it. Give the value for the table of numbers in this key",
+                key,
+            )
 
     def agrees_with(self, shape: tuple[int, int]) -> bool:
         """Return whether the heading states the rows and columns of a table; raise an error if it states others."""
@@ -357,24 +328,11 @@ class _Heading:
 
     def find_height_unit(self, settings: Preparation) -> float | None:
         """Return the unit of the heights, m; None without a unit."""
-        texts = self.values("value units", "unit of heights")
-        general = [] if texts else self.values("unit")
-        if (texts or general) and settings.height_unit is None:
-            self.ask_about_unread_line("height_unit", (texts or general)[0])
-            if general and not self.is_known:
-                self._ask_about_another_unit(general[0])
-        return _agreed("height_unit", texts or general, settings.height_unit)
-
-    def _ask_about_another_unit(self, general):
-        """Raise UnfitTopography if a unit without a name may not be that of the heights.
-
-        It may be that of the lengths if a line other than those of lengths states another unit.
-        """
-        lateral = [line for name, value, line in self.entries if name in _LATERAL and re.search(r"\d", value)]
-        for line in self.lines:
-            others = set(map(metres_of, re.findall(r"[^\W\d_]+", line))) - {metres_of(general)}
-            if line not in lateral and any(unit and unit <= _COARSEST for unit in others):
-                self._ask("height_unit", general, line)
+        texts = self.values("value units", "unit of heights") or self.values("unit")
+        unit = _agreed("height_unit", texts, settings.height_unit)
+        if texts and settings.height_unit is None:
+            self.ask_beside_unknown_lines("height_unit", texts[0])
+        return unit
 
     def find_lateral_unit(self, settings: Preparation) -> float | None:
         """Return the unit of the coordinates, m; None without a unit."""
@@ -398,21 +356,20 @@ class _Heading:
             steps = re.fullmatch(rf"{_NUMBER}(?: x {_NUMBER})?", texts[0][0]) if self.is_grid and texts else None
             return None, steps and (_number(steps[1]) * columns, _number(steps[2] or steps[1]) * rows)
         stated = ", ".join(text for text, _, _ in found)
-        if settings.size is None:
-            self.ask_about_unread_line("size", stated)
         pixels = [(x / columns, y / rows) for _, x, y in found]
         mark = "." if self.decimal == "," else ","
+        problem = ""
         if any(AMBIGUOUS_COMMA.match(text.replace(".", ",")) and mark in text for text, _, _ in found):
             problem = f"is {stated!r} in the file; the {mark!r} may be decimal or separate thousands"
-        elif self.is_grid or self.is_image or np.allclose(pixels, pixels[0][0], rtol=_SQUARE, atol=0):
-            return found[0][1:], None
-        else:
+        elif not (self.is_grid or self.is_image or np.allclose(pixels, pixels[0][0], rtol=_SQUARE, atol=0)):
             problem = (
                 f"is missing, and the lengths in the heading, {stated}, do not fit {columns} x {rows} square pixels"
             )
-        if settings.size is None:
+        if settings.size is None and problem:
             raise UnfitTopography(f"{problem}. Give the size in this key", "size")
-        return None, None
+        if settings.size is None:
+            self.ask_beside_unknown_lines("size", stated)
+        return (None if problem else found[0][1:]), None
 
 
 def _agreed(key, texts, given):
