@@ -155,8 +155,8 @@ def test_factors_of_heights_in_headings_are_asked_about(tmp_path, entry):
 
 # Lines that change the size or the heights, or nothing: only a person knows.
 UNKNOWN = "Line spacing: 1 um|Binning: 2x2|every second line is left out|Transposed: yes|Downsampled|Heights times ten"
-UNKNOWN += "|Z zoom: 10x|log10 of heights|Comment: heights x 10|Units: x10|Normalized to rms = 1|Objective: 50x|Pixels 4um"
-UNKNOWN += "|Lines: 24, every second one left out|Unit: nm, one half|Topography"
+UNKNOWN += "|Z zoom: 10x|log10 of heights|Comment: heights x 10|Units: x10|Normalized to rms = 1|Objective: 50x"
+UNKNOWN += "|Pixels 4um|Lines: 24, every second one left out|Unit: nm, one half|Topography"
 
 
 @pytest.mark.parametrize("line", UNKNOWN.split("|"))
