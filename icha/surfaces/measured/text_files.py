@@ -65,6 +65,7 @@ _NAMES = {
     "pixel": "pixel|pixel size|pixel spacing|point spacing|spacing|cell size|cellsize|xy calibration|xy justierung",
     "rows": "nrows|ny|rows|lines|number of rows|number of lines|vertical|vertikal",
     "columns": "ncols|nx|cols|columns|number of columns|points per line|pixels per line|horizontal|horizont",
+    "corner": "xllcorner|yllcorner|xllcenter|yllcenter",
     "missing": "nodata value|nodata|no data|undefined value|nan value|fehlwert|ungültiger wert|valeur manquante"
     "|no data value|missing value|missing data value|bad value|bad data|invalid"
     "|invalid value|invalid data|invalid height|void value|null value|fill value|fillvalue",
@@ -281,7 +282,7 @@ class _Heading:
         is_keyence = not names.isdisjoint({"xy calibration", "xy justierung"})
         is_zygo = "".join(self.lines[:1]).startswith(_ZYGO)
         # Lines of a heading of no known format that ICHA does not know.
-        self.unknown = [] if self.is_grid or self.is_image or is_points or is_keyence or is_zygo else unknown
+        self.unknown = [] if self.is_image or is_points or is_keyence or is_zygo else unknown
 
     def values(self, *meanings: str) -> list[str]:
         """Return the values of the entries with these meanings."""
