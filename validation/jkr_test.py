@@ -29,6 +29,7 @@ CASES = {
     "contact radius, noise a share of the range": (["contact_radius"], True, "range", (1, 10)),
     "indentation": (["indentation"], True, "largest", (1, 10)),
     "indentation, unknown zero": (["indentation"], False, "largest", (1, 10)),
+    "indentation, unknown zero, approach and retreat": (["indentation"], False, "largest", (1, 10)),
     "both, unknown zero": (["contact_radius", "indentation"], False, "largest", (1, 10)),
     "contact radius, load 20": (["contact_radius"], True, "largest", (20, 20)),
     "indentation, load 20": (["indentation"], True, "largest", (20, 20)),
@@ -63,6 +64,14 @@ def exact_test(
     return {"force": force, "contact_radius": contact, "indentation": contact**2 / radius - lift}
 
 
+def with_free_states(exact: Mapping[str, np.ndarray], count=30) -> dict[str, np.ndarray]:
+    """Return a test that begins with an approach and ends with a retreat, without contact or force."""
+    depth, none = exact["indentation"], np.zeros(count)
+    before = {"indentation": np.linspace(-depth.max(), 0, count, endpoint=False)}
+    after = {"indentation": np.linspace(depth[-1], -depth.max(), count)}
+    return {name: np.concatenate([before.get(name, none), each, after.get(name, none)]) for name, each in exact.items()}
+
+
 def noisy_test(exact: Mapping[str, np.ndarray], rng, columns, offset=0.0, size="largest") -> dict[str, np.ndarray]:
     """Return the force and other columns of a test with normal noise; indentations are moved by an offset, m."""
     found = {}
@@ -90,6 +99,8 @@ def count_coverage(case: str) -> dict:
     for _ in range(TESTS):
         truth = random_truth(rng, loads)
         exact = exact_test(**truth)
+        if case.endswith("retreat"):
+            exact = with_free_states(exact)
         offset = 0.0 if known else 0.3 * float(exact["indentation"].max())
         table = noisy_test(exact, rng, columns, offset, size)
         test = icha.fit_jkr_test(table, truth["radius"], indentation_offset=0.0 if known else None)

@@ -4,6 +4,7 @@ Loading follows the equilibria of Johnson, Kendall and Roberts with the advancin
 point, the contact is stuck: its radius is constant, and the force decreases with the stiffness 2 E* a of a flat punch,
 until the energy release rate is the receding work of adhesion. Then unloading follows the equilibria with this work (D.
 Maugis and M. Barquins, J. Phys. D: Appl. Phys. 11 (1978) 1989, doi:10.1088/0022-3727/11/14/011).
+Where the sphere would not touch the undeformed plane it may also be free, without a force: before and after contact.
 
 All measured quantities have errors, so a fit minimises the squared distances between points and curves, each quantity
 divided by its error (P. T. Boggs, R. H. Byrd and R. B. Schnabel, SIAM J. Sci. Stat. Comput. 8 (1987) 1052,
@@ -26,6 +27,8 @@ from scipy.stats import t as student
 from icha.references.indentation import ContactState, sphere_contact, sphere_radius_at_force
 from icha.references.jkr_tables import far_from_the_rest
 
+# Branch of points without contact.
+FREE = "without contact"
 # States of a branch, and the smallest contact radius among them, divided by that of the turning point.
 _STATES, _SMALLEST = 400, 1e-3
 # First guesses: modulus and receding work in units of the points, and the ratio of advancing to receding work.
@@ -38,6 +41,8 @@ _REFINED, _CONVERGENCE = 3, {"ftol": 1e-6, "xtol": 1e-6}
 _NEVER, _BY_NOISE = 100.0, 13.0
 # Step of numerical derivatives, not much narrower than the distance between states.
 _STEP = 1e-3
+# A sphere with more than this part of the largest force or tension is in contact.
+_CLEAR_FORCE = 0.1
 # Largest ratio of the ends of the interval of a modulus; wider ones are far beyond the linear approximation. Largest
 # leverage of a point in its interval: the residual of a point that alone determines a value shows no error.
 _WIDEST, _MOST_LEVERAGE = 10.0, 0.5
@@ -98,7 +103,7 @@ def fit_loop(
 
     Parameters
     ----------
-    points : (n,) float by quantity, with `force` and at least one of `contact_radius` and `indentation`, SI units.
+    points : (n,) float by quantity: first `force`, then `contact_radius`, `indentation` or both, SI units.
     unloading : (n,) bool, True for points of unloading.
     errors : standard deviation of each quantity; only their ratios have an effect.
     radius : radius of the sphere, m.
@@ -109,7 +114,7 @@ def fit_loop(
     Returns
     -------
     Fitted loop, and loops with the lower and the upper ends of the intervals; the nearest state of the fitted loop to
-    each point, (quantity, n); the branch of this state, (n,) text.
+    each point, (quantity, n); the branch of this state, (n,) text: a key of `Loop.curves`, or `FREE`.
 
     Raises
     ------
@@ -118,7 +123,7 @@ def fit_loop(
     """
     force, scales = points["force"], np.array([errors[name] for name in points])
     data, top, unloads = np.stack(list(points.values()), axis=-1) / scales, int(np.argmax(force)), bool(unloading.any())
-    depth = np.ptp(points["indentation"]) if "indentation" in points else points["contact_radius"].max() ** 2 / radius
+    depth = range_in_contact(points) if "indentation" in points else points["contact_radius"].max() ** 2 / radius
     modulus, work = 0.75 * force[top] * radius / (depth * radius) ** 1.5, force[top] / (1.5 * np.pi * radius)
 
     def loop_of(unknown):
@@ -127,14 +132,21 @@ def fit_loop(
         turn = float(sphere_radius_at_force(force[top], radius, fitted, advancing)) * math.exp(unknown[3] * unloads)
         return Loop(fitted, advancing, receding, turn, depth * unknown[4] if offset is None else offset)
 
+    # Contacts do not reach beyond the touch and the jump-off where a sphere may be free.
+    reach = np.inf if "contact_radius" in points else 1.0
+
     def project(loop):
         curves, near, branch = loop.curves(radius), np.empty_like(data), np.empty(len(data), object)
         states = {name: np.stack([getattr(each, q) for q in points], -1) / scales for name, each in curves.items()}
         states["loading"] = states["loading"][::-1]  # Both curves begin at the turning point.
         for members, names in ((~unloading, ["loading"]), (unloading, list(states)[1:])):
             if members.any():
-                near[members], side = _nearest(data[members], np.concatenate([states[name] for name in names]))
+                near[members], side = _nearest(data[members], np.concatenate([states[name] for name in names]), reach)
                 branch[members] = np.repeat(names, _STATES)[side]
+        if "contact_radius" not in points:  # These would tell a free sphere from one in contact.
+            free = np.minimum(data, [np.inf, loop.offset / errors["indentation"]]) * [0, 1]
+            closer = np.linalg.norm(data - free, axis=1) < np.linalg.norm(data - near, axis=1)
+            near[closer], branch[closer] = free[closer], FREE
         if unloads:  # The largest force is at the turning point, which no other point bounds if hardly any is stuck.
             near[top] = states["loading"][0]
         return near, branch
@@ -192,13 +204,19 @@ def fit_loop(
     return loops, (near * scales).T, branch
 
 
-def _nearest(points, curve):
-    """Return the nearest point of a polygon, whose last side has no outer end, and the side, by point."""
+def range_in_contact(points: dict[str, np.ndarray]) -> float:
+    """Return the range of the indentation among points whose force is clearly not that of a free sphere, m."""
+    force, indentation = np.abs(points["force"]), points["indentation"]
+    return float(np.ptp(indentation[force > _CLEAR_FORCE * force.max()]) or np.ptp(indentation))
+
+
+def _nearest(points, curve, reach):
+    """Return the nearest point of a polygon and the side, by point; the last side ends at `reach` times its length."""
     node = KDTree(curve).query(points)[1]
     side = np.stack([np.maximum(node - 1, 0), np.minimum(node, len(curve) - 2)])
     along = curve[side + 1] - curve[side]
     share = ((points - curve[side]) * along).sum(-1) / np.maximum((along**2).sum(-1), np.finfo(float).tiny)
-    share = np.clip(share, 0, np.where(side == len(curve) - 2, np.inf, 1))
+    share = np.clip(share, 0, np.where(side == len(curve) - 2, reach, 1))
     near = curve[side] + share[..., None] * along
     closer = ((points - near) ** 2).sum(-1).argmin(axis=0), np.arange(len(points))
     return near[closer], side[closer]

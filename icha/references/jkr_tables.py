@@ -114,8 +114,6 @@ def read_points(table: Any, columns: Mapping[str, str], units: Mapping[str, str]
                 f"column {title!r}, {places[largest]}: {array[largest]:.6g} is more than {_FAR} times every other "
                 "number; expected measured values. Correct or remove the points that mark missing values by it"
             )
-        if (far := _spikes(array)).size:
-            raise ValueError(f"column {title!r}: {far_from_the_rest([(places[k], f'{array[k]:.6g}') for k in far])}")
     unloading = None
     if title := found.get("branch"):
         texts = [str(text).strip().lower() for text in by_title[title]]
@@ -123,6 +121,9 @@ def read_points(table: Any, columns: Mapping[str, str], units: Mapping[str, str]
             if text not in _LOADING + _UNLOADING:
                 raise ValueError(f"column {title!r}, {place}: {text[:40]!r}; {_BRANCH}")
         unloading = np.isin(texts, _UNLOADING)
+    for title, array in zip(titles.values(), numbers, strict=True) if unloading is None else ():
+        if (far := _spikes(array)).size:
+            raise ValueError(f"column {title!r}: {far_from_the_rest([(places[k], f'{array[k]:.6g}') for k in far])}")
     values = {name: array * factor for name, array, factor in zip(titles, numbers, factors, strict=True)}
     return Points(values, unloading, places)
 

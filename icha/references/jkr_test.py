@@ -16,9 +16,9 @@ from icha.asperity.full_contact import HIGH_PULL_OFF_BELOW, full_contact_energy_
 from icha.asperity.material import VAN_DER_WAALS_RANGE, Material
 from icha.asperity.tabor import describe_short_range
 from icha.references.indentation import axisymmetric_contact, sphere_contact, sphere_energy_release_rate
-from icha.references.jkr_loop import Loop, fit_loop
+from icha.references.jkr_loop import FREE, Loop, fit_loop, range_in_contact
 from icha.references.jkr_tables import LEAST_POINTS, Points, read_points, refuse_lost_order, refuse_wrong_signs
-from icha.support.formatting import choose_unit, format_count
+from icha.support.formatting import choose_unit, format_count, format_quantity
 from icha.support.rules import INDENTATIONS, LENGTH, POSITIVE
 from icha.support.usual import USUAL, IchaWarning, unusual_arguments
 from icha.surfaces.shapes import Sphere
@@ -28,13 +28,13 @@ if TYPE_CHECKING:
 
 # Probability that an interval contains the true value.
 PROBABILITY = 0.9
-# Under displacement control, a sphere of JKR jumps off at 5/9 of the pull-off force. Points with less tension, after
-# the point of the largest tension, are without contact.
-_JUMP_OFF_SHARE = 0.5
-# The largest tension of loading shows the jump-in if it exceeds the noise by this factor.
-_CLEAR_TENSION = 4.0
 # Largest relative error of the force without a warning, by the curvature of the sphere and by the thickness of a layer.
 _FORCE_ERROR = 0.02
+# The zero of the force is shifted if the median force of points without contact exceeds its standard error by the first
+# factor, and the pull-off force times the second.
+_CLEAR_SHIFT, _LEAST_SHIFT = 4.0, 0.01
+# Standard error of the median of normal values times the root of their number, over their median absolute deviation.
+_OF_MEDIAN = 1.4826 * math.sqrt(math.pi / 2)
 # Smallest work of adhesion without a warning, J/m^2.
 _LEAST_WORK = 1e-3
 # Largest force over the pull-off force without a warning; docs/estimates.md gives the intervals of larger loads.
@@ -144,7 +144,7 @@ def fit_jkr_test(
     units : units by quantity, if the headings have none.
     indentation_offset : indentation of the table where the lens touches the undeformed plane, m; None to fit it.
     errors : standard deviation of each quantity, in SI units; only their ratios have an effect. Default: the same
-        fraction of the largest contact radius, and of the ranges of force and indentation.
+        fraction of the largest contact radius, of the range of the force, and of that of the indentation in contact.
     interaction_range : range of the attraction, m, for the warning of small Tabor parameters.
     thickness : thickness of an elastic layer, m; infinite for a half-space.
     roughness : surface with the roughness of lens and sample, for the warning of rough surfaces.
@@ -167,17 +167,20 @@ def fit_jkr_test(
     try:
         points = read_points(table, columns or {}, units or {})
         used_for, unloading = _choose_points(points, radius)
-        used, measured = used_for == "", points.values
-        chosen = {quantity: values[used] for quantity, values in measured.items()}
-        if not errors:
-            sizes = {name: max(each) if name == "contact_radius" else np.ptp(each) for name, each in chosen.items()}
-            errors = {name: float(size) for name, size in sizes.items()}
-        elif missing := chosen.keys() - errors.keys():
-            raise ValueError(f"errors: no value for {min(missing)}; expected one for {', '.join(chosen)}")
-        errors = {name: POSITIVE.validate(f"errors, {name}", errors[name]) for name in chosen}
-        places = [points.places[k] for k in np.flatnonzero(used)]
-        options = radius, indentation_offset, PROBABILITY, places
-        loops, near, used_for[used] = fit_loop(chosen, unloading[used], errors, *options)
+        measured, branch = points.values, np.array([FREE])
+        while FREE in branch:  # Each fit finds points without contact, and the next one leaves them out.
+            used = used_for == ""
+            if 0 < np.sum(used & unloading) < LEAST_POINTS:  # Noise at the turning point is not unloading.
+                used_for[used & unloading] = f"unloading (fewer than {LEAST_POINTS})"
+                used, unloading = used & ~unloading, np.zeros_like(unloading)
+            _refuse_few(int(np.sum(used & ~unloading)), int(np.sum(used & unloading)), "contact_radius" in measured)
+            chosen = {quantity: values[used] for quantity, values in measured.items()}
+            sigma = _errors(chosen, errors)
+            places = [points.places[k] for k in np.flatnonzero(used)]
+            options = radius, indentation_offset, PROBABILITY, places
+            loops, near, branch = fit_loop(chosen, unloading[used], sigma, *options)
+            used_for[used] = np.where(branch == FREE, FREE, "")
+        used_for[used] = branch
         if loops[0].contact_modulus > USUAL["contact_modulus"].most:
             raise ValueError(*unusual_arguments({"contact_modulus": loops[0].contact_modulus}))
     except ValueError as error:
@@ -191,10 +194,20 @@ def fit_jkr_test(
     fits_offset = "indentation" in chosen and indentation_offset is None
     values = modulus, advancing, receding if recedes else None, offset if fits_offset else None
     test = JKRTest(radius, *values, measured, fitted, used_for, loops[0])
-    test = replace(test, warnings=tuple(_warnings(test, errors, interaction_range, thickness, roughness)))
+    test = replace(test, warnings=tuple(_warnings(test, sigma, interaction_range, thickness, roughness)))
     for reason in test.warnings:
         warnings.warn(reason, IchaWarning, stacklevel=2)
     return test
+
+
+def _errors(chosen, given):
+    """Return the standard deviation of each quantity: the given ones, or shares of its size in contact."""
+    if not given:
+        sizes = {"force": np.ptp, "contact_radius": np.max, "indentation": lambda _: range_in_contact(chosen)}
+        given = {name: float(sizes[name](each)) for name, each in chosen.items()}
+    elif missing := chosen.keys() - given.keys():
+        raise ValueError(f"errors: no value for {min(missing)}; expected one for {', '.join(chosen)}")
+    return {name: POSITIVE.validate(f"errors, {name}", given[name]) for name in chosen}
 
 
 def _choose_points(points: Points, radius: float) -> tuple[np.ndarray, np.ndarray]:
@@ -212,7 +225,7 @@ def _choose_points(points: Points, radius: float) -> tuple[np.ndarray, np.ndarra
         refuse_lost_order(values, places)
     unloading = np.arange(len(force)) > top if points.unloading is None else points.unloading
     if contact is not None:
-        left_out = np.where(contact == 0, "without contact", "").astype(object)
+        left_out = np.where(contact == 0, FREE, "").astype(object)
         used = np.flatnonzero(contact)
         if points.unloading is None and (gaps := np.flatnonzero(np.diff(used) > 1)).size:
             raise ValueError(
@@ -220,38 +233,21 @@ def _choose_points(points: Points, radius: float) -> tuple[np.ndarray, np.ndarra
                 "and after the contact. Remove the points without a measured radius"
             )
     else:
-        left_out = _without_contact(force, unloading)
-    # Noise at the turning point is not unloading.
-    if 0 < (unloading & (left_out == "")).sum() < LEAST_POINTS:
-        left_out[unloading & (left_out == "")] = f"unloading (fewer than {LEAST_POINTS})"
-        unloading = np.zeros_like(unloading)
-    kept, unknowns = left_out == "", 2 + (contact is None) + 2 * bool(unloading.any())
-    loading = int(np.sum(kept & ~unloading))
-    if loading < LEAST_POINTS or kept.sum() <= unknowns:
-        raise ValueError(
-            f"has {format_count(loading, 'point')} of loading and {kept.sum() - loading} of unloading with contact; "
-            f"expected at least {LEAST_POINTS} of loading and {unknowns + 1} together, in the order of the test or "
-            "with a column `branch`"
-        )
-    if constant := [quantity for quantity, column in values.items() if not np.ptp(column[kept]) > 0]:
+        left_out = np.full(len(force), "", object)  # The fit finds points without contact.
+    if constant := [quantity for quantity, column in values.items() if not np.ptp(column[left_out == ""]) > 0]:
         raise ValueError(f"column of {constant[0]}: all values are the same; expected measured values")
     return left_out, unloading
 
 
-def _without_contact(force, unloading):
-    """Return why points of tests without contact radii are left out: before the contact forms, or after it breaks."""
-    left_out = np.full(len(force), "", object)
-    loading, after = np.flatnonzero(~unloading), np.flatnonzero(unloading)
-    if loading.size and force[loading].min() <= 0:
-        # Contact begins with the largest tension of loading; or, if noise hides it, after the last force of 0.
-        lowest, last = int(np.argmin(force[loading])), int(np.flatnonzero(force[loading] <= 0)[-1])
-        noise = np.median(np.abs(np.diff(force[loading[: last + 1]]))) / 0.95 if last else 0.0
-        begin = lowest if -force[loading[lowest]] > _CLEAR_TENSION * noise else last + 1
-        left_out[loading[: begin * (lowest > 1)]] = "before contact"
-    if after.size and (largest := -force[after].min()) > 0:
-        off = (np.arange(after.size) > force[after].argmin()) & (-force[after] < _JUMP_OFF_SHARE * largest)
-        left_out[after[np.logical_or.accumulate(off)]] = "after pull-off"
-    return left_out
+def _refuse_few(loading, unloading, has_radius):
+    """Raise ValueError if the numbers of points in contact are too small for the unknowns of a fit."""
+    unknowns = 3 - has_radius + 2 * bool(unloading)
+    if loading < LEAST_POINTS or loading + unloading <= unknowns:
+        raise ValueError(
+            f"has {format_count(loading, 'point')} of loading and {unloading} of unloading with contact; expected at "
+            f"least {LEAST_POINTS} of loading and {unknowns + 1} together, in the order of the test or with a column "
+            "`branch`"
+        )
 
 
 def force_increase_by_layer(ratio: float) -> float:
@@ -302,6 +298,16 @@ def _warnings(test, errors, interaction_range, thickness, roughness) -> Iterator
             f"the largest force is {force / pull_off if pull_off else math.inf:.3g} times the pull-off force: noise "
             "hides the adhesion; smaller loads give narrower intervals"
         )
+    free = test.measured["force"][test.used_for == FREE]
+    if len(free) >= LEAST_POINTS:
+        shift = np.median(free)
+        error = _OF_MEDIAN * np.median(np.abs(free - shift)) / math.sqrt(len(free))
+        if abs(shift) > max(_CLEAR_SHIFT * error, _LEAST_SHIFT * pull_off):
+            shown = format_quantity(float(f"{shift:.3g}"), "N")
+            yield (
+                f"the median force of points without contact is {shown}, so the zero of the force is shifted, and the "
+                "works of adhesion are wrong: subtract this force from all forces"
+            )
     size = min(largest, 0.99 * test.radius)
     exact = axisymmetric_contact(size, Sphere(test.radius).slope, modulus).force
     if (error := float(exact / sphere_contact(size, test.radius, modulus).force - 1)) > _FORCE_ERROR:

@@ -13,7 +13,7 @@ from icha.boundary_elements.contact import contact_of
 from icha.cli import app
 from icha.references.jkr_tables import read_points, refuse_lost_order
 from icha.references.jkr_test import Estimate, force_increase_by_layer
-from validation.jkr_test import exact_test, noisy_test
+from validation.jkr_test import exact_test, noisy_test, with_free_states
 
 TRUTH = {"contact_modulus": 1.8e6, "advancing_work": 0.03, "receding_work": 0.09}
 RADIUS, COLUMNS = 5e-3, ["contact_radius", "indentation"]
@@ -121,6 +121,11 @@ def test_a_column_of_the_branch_replaces_the_order():
     table = {name: EXACT[name][order] for name in ("force", "contact_radius")}
     table["branch"] = np.where(order < 20, "loading", "Retraction")
     np.testing.assert_allclose(values(icha.fit_jkr_test(table, RADIUS)), list(TRUTH.values()), rtol=1e-3)
+    # Sorted by the force, neighbours are of both branches.
+    order = np.argsort(EXACT["force"], kind="stable")
+    table = {name: EXACT[name][order] for name in ("force", "contact_radius")}
+    table["branch"] = np.where(order < 20, "loading", "unloading")
+    np.testing.assert_allclose(values(icha.fit_jkr_test(table, RADIUS)), list(TRUTH.values()), rtol=1e-3)
 
 
 def test_points_without_contact_are_left_out_and_counted():
@@ -133,11 +138,55 @@ def test_points_without_contact_are_left_out_and_counted():
     force = np.concatenate([np.zeros(15), jumped["force"], states["force"], np.zeros(12)])
     depth = np.concatenate([before, jumped["indentation"], states["indentation"], after])
     test = icha.fit_jkr_test({"force": force + 1e-5 * rng.standard_normal(len(force)), "indentation": depth}, RADIUS)
-    assert test.counts["before contact"] == 15 and test.counts["after pull-off"] == 12
+    assert test.counts["without contact"] == 27
     np.testing.assert_allclose(values(test), list(TRUTH.values()), rtol=0.05)
     assert np.isnan(test.fitted["force"][:15]).all()
     contact = np.concatenate([np.zeros(16), states["contact_radius"], np.zeros(12)])
     assert icha.fit_jkr_test({"force": force, "contact_radius": contact}, RADIUS).counts["without contact"] == 28
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+@pytest.mark.parametrize("free", [0.0, -0.2])
+def test_a_single_point_without_contact_changes_nothing(noise, free):
+    """Exports often begin with the zero of the instrument, or with the last point of the approach."""
+    states, rng = exact_test(points=26), np.random.default_rng(1)
+    names, largest = ("force", "indentation"), {name: states[name].max() for name in ("force", "indentation")}
+    table = {name: states[name] + noise * largest[name] * rng.standard_normal(26) for name in names}
+    first = {"force": noise * largest["force"], "indentation": free * largest["indentation"]}
+    longer = {name: np.append(first[name], table[name]) for name in names}
+    tests = [icha.fit_jkr_test(each, RADIUS) for each in (table, longer)]
+    assert tests[1].counts == tests[0].counts | {"without contact": 1} and np.isnan(tests[1].fitted["force"][0])
+    np.testing.assert_allclose(values(tests[1]), values(tests[0]), rtol=0.01)
+    np.testing.assert_allclose(tests[1].advancing_work, tests[0].advancing_work, rtol=0.02)
+
+
+@pytest.mark.parametrize("columns", [COLUMNS[:1], COLUMNS[1:]])
+def test_a_shifted_zero_of_the_force_is_seen_without_contact(columns):
+    states = with_free_states(EXACT, 10)
+    for shift, warned in ((0.0, False), (1e-4, True), (-1e-4, True)):
+        table = {name: states[name] for name in ("force", *columns)}
+        noise = 2e-5 * np.random.default_rng(1).standard_normal(len(table["force"]))
+        test = icha.fit_jkr_test(table | {"force": table["force"] + shift + noise}, RADIUS)
+        assert test.counts["without contact"] == 20
+        shown = f"{'-' * (shift < 0)}(9|10)\\d(\\.\\d)? µN"
+        assert any(re.search(f"without contact is {shown}", text) for text in test.warnings) == warned, test.warnings
+
+
+def test_a_retreat_without_adhesion_is_no_contact():
+    radius = np.append(np.linspace(10e-6, 300e-6, 20), np.linspace(290e-6, 10e-6, 20))
+    force = np.append(4 * 1e6 * radius**3 / (3 * RADIUS), np.zeros(30))
+    depth = np.append(radius**2 / RADIUS, np.linspace(-1e-6, -40e-6, 30))
+    noise = 2e-3 * force.max() * np.random.default_rng(2).standard_normal(len(force))
+    test = icha.fit_jkr_test({"force": force + noise, "indentation": depth}, RADIUS)
+    assert test.contact_modulus.value == pytest.approx(1e6, rel=0.02) and test.counts["without contact"] >= 28
+
+
+def test_a_long_approach_does_not_replace_points_of_loading():
+    states = exact_test(points=40)
+    table = {name: states[name][18:] for name in ("force", "indentation")}
+    approach = {"force": np.zeros(20), "indentation": np.linspace(-20e-6, -1e-6, 20)}
+    with pytest.raises(ValueError, match="has 2 points of loading and 20 of unloading with contact; expected at least"):
+        icha.fit_jkr_test({name: np.append(approach[name], table[name]) for name in table}, RADIUS)
 
 
 def test_without_unloading_there_is_only_the_advancing_work():
