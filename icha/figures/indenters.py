@@ -44,6 +44,8 @@ _FITS = """Where a fit is missing, the Tabor parameter of the sphere is below 3,
 are fewer than three states; or the contact is so small that Hertz's law without adhesion fits better. Where the
 tension exceeds the pull-off force of a fit, which happens on rough spheres, the square root in its radius is set to
 zero. Runs without adhesion, on shapes without a radius, and on layers are left out."""
+_EQUIVALENT = """The radius R of a paraboloid is the geometric mean of its two radii, sqrt(R1 R2); the pull-off force of
+JKR with R is 0.5 % larger than that of the paraboloid for R1 = 2 R2, and 2 % larger for R1 = 5 R2."""
 
 
 class Series(NamedTuple):
@@ -133,6 +135,12 @@ def _select_measured(figure, measurements, *needed):
     return found
 
 
+def _radius_of_paraboloids(series):
+    """Return what the radius of a paraboloid is, if a run of some series has this shape."""
+    shapes = {str(run["shape"].values) for each in series for run in each.runs.by_seed.values() if "shape" in run}
+    return _EQUIVALENT if any(shape.startswith("paraboloid of radii") for shape in shapes) else ""
+
+
 # --- figure 17 ---
 
 # Largest number of series in a panel.
@@ -152,8 +160,6 @@ _SPHERES = """The theories of Hertz, and of Johnson, Kendall and Roberts (JKR), 
 the modulus and the works of adhesion of the runs in the same panel. The line of JKR includes states that are unstable
 under load control, up to the jump-off under displacement control. Runs without adhesion have no line of JKR; shapes
 without a radius and layers have no line."""
-_EQUIVALENT = """The radius R of a paraboloid is the geometric mean of its two radii, sqrt(R1 R2); the pull-off force of
-JKR with R is 0.5 % larger than that of the paraboloid for R1 = 2 R2, and 2 % larger for R1 = 5 R2."""
 
 
 @in_style
@@ -174,6 +180,8 @@ def force_indentation(campaign: xr.DataTree, *, study: str, measurements: Sequen
     say(fig, _INDENTATION)
     _show_runs(fig, campaign, series)
     measured = _select_measured(fig, measurements, *names)
+    if measured and not together:
+        say(fig, "They are drawn beside all series of their material, whatever the shape.")
     points = map(panel.points, [*runs, *(each.values for each, _ in measured)])
     limits = [limits_around(np.concatenate(values)) for values in zip(*points, strict=True)]
     largest = max(float(run["contact_radius"].max()) for run in runs)
@@ -226,12 +234,6 @@ def _theory_curves(run, largest_radius):
 
 
 # Variables of the works of adhesion; title of the panel and marker of the states.
-def _radius_of_paraboloids(series):
-    """Return what the radius of a paraboloid is, if a run of some series has this shape."""
-    shapes = {str(run["shape"].values) for each in series for run in each.runs.by_seed.values() if "shape" in run}
-    return _EQUIVALENT if any(shape.startswith("paraboloid of radii") for shape in shapes) else ""
-
-
 _TITLES = {"approach": ("loading", "o"), "retraction": ("unloading", "s")}
 _STATES = {"ls": "none", "ms": 2.8, "mew": 0.6, "mfc": "white"}
 _FIT = {"lw": 0.9, "ls": "-"}
@@ -280,6 +282,7 @@ def jkr_plot(campaign: xr.DataTree, *, study: str, measurements: Sequence[Measur
             line = 0.75 / modulus * (x + np.sqrt(8 * np.pi * modulus * float(run[name])))
             plot(ax, x * scale, line * 1e3, Name("fit of JKR", labels), color=each.colour, **_FIT)
     measured = _select_measured(fig, measurements, "force", "contact_radius")
+    say(fig, "Of these, all states are shown, also those whose edge stands." if measured else "")
     for each, look in measured:
         force = each.values["force"]
         x, y = _straight(force, each.values["contact_radius"], series[0].runs.first)
