@@ -34,14 +34,15 @@ KINDS = (
 _ENERGY_RATIOS = ((20.0, 50.0), (10.0, 20.0), (5.0, 10.0), (2.5, 5.0), (1.3, 2.5), (0.7, 1.3))
 COUNT = len(KINDS) * len(_ENERGY_RATIOS)
 _HALVES = {"first half": range(COUNT // 2), "second half": range(COUNT // 2, COUNT)}
-_SCANS = (
-    "config/topographies/published/al3d-1.al3d",
-    "tests/data/topographies/top-1.top",
-    "config/topographies/published/di-3.di",
-    "tests/data/topographies/matrix-4.txt",
-    "config/topographies/published/tmd-1.tmd",
-    "tests/data/topographies/x3p-2_part.x3p",
-)
+# The text states a pixel of 369.862 nm and 29.1818 nm for one radian.
+_SCANS = {
+    "config/topographies/published/al3d-1.al3d": {},
+    "tests/data/topographies/top-1.top": {},
+    "config/topographies/published/di-3.di": {},
+    "tests/data/topographies/matrix-4.txt": {"size": ["27.73965 um", "112.80791 um"], "height_unit": "29.1818 nm"},
+    "config/topographies/published/tmd-1.tmd": {},
+    "tests/data/topographies/x3p-2_part.x3p": {},
+}
 LOADS = (1e-3, 3e-3, 1e-2, 2e-2, 5e-2, 0.12)
 # Largest loads of the runs whose marks are examined.
 LARGEST_LOADS = (0.01, 0.05, 0.12)
@@ -104,7 +105,8 @@ def _heights(kind, rng, grid, level):
             return np.exp(rng.choice([-1, 1]) * rng.uniform(0.3, 0.8) * _random(rng, grid))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the slopes of scans may be unusual
-        return read_scan(_ROOT / _SCANS[level], boundary="window", grid=256).heights
+        path, stated = list(_SCANS.items())[level]
+        return read_scan(_ROOT / path, boundary="window", grid=256, **stated).heights
 
 
 def _random(rng, grid, amplitudes="fixed"):

@@ -215,12 +215,10 @@ def test_a_damaged_text_of_an_instrument_is_refused_as_one(tmp_path, monkeypatch
 
 
 LINE_SCAN = "is a line scan, one profile of 50 points"
-TITLES = "X;Y;valid\n[mm];[mm];[1/0]\n"
 WITHOUT_A_MAP = [
     ("profile.txt", "\n".join(f"{k * 0.1} {k % 7}" for k in range(50)), LINE_SCAN),
     ("profile.txt", "\n".join(f"{k % 7}" for k in range(50)), LINE_SCAN),
     ("profile.xyz", "\n".join(f"{k * 0.1} 2.5 {k % 7}" for k in range(50)), LINE_SCAN),
-    ("profile.csv", TITLES + "\n".join(f"{k * 0.1};{k % 7};1" for k in range(50)), LINE_SCAN),
     *((f"scan.{ending}", "", "is empty") for ending in ("txt", "xyz", "npy", "nc", "h5", "dat")),
     ("heading.xyz", "# width 90 um\n\n  # heights\n", "has no numbers"),
 ]

@@ -180,6 +180,26 @@ def test_lines_about_directions_and_factors_beside_points(tmp_path):
     assert_heights(read(written(tmp_path, text(rows(), " ", ["Inverted: no", "Invertiert: nein", "Invert Z: false"]))))
 
 
+@pytest.mark.parametrize(
+    "heading",
+    [
+        "Wyko ASCII Data File Format\t0\t0\t1\nX Size\t24\nY Size\t24\nWavelength\t7\t4\t632.8\n"
+        "Pixel_size\t7\t4\t0.0005\nRAW_DATA\t3\t2304\t",
+        "# File Format = ASCII\n# x-pixels = 24\n# x-length = 12000\n# x-unit = nm\n# z-unit = nm\n# voidpixels = 4",
+        "File Format = ASCII\nScale X = 0.5\nScale Y = 0.5\nScale Data = 0.1\nDataScaleNeeded = yes",
+    ],
+    ids=["Wyko", "SPIP", "Nova"],
+)
+def test_texts_of_instruments_are_tables_whose_size_and_unit_are_asked_for(tmp_path, heading):
+    path = written(tmp_path, text(rows(), "\t", [heading]), "scan.asc")
+    for key in ("size", "height_unit"):
+        with refused(key, "is missing"):
+            read(path, **{key: None})
+    assert_heights(read(path))
+    with refused("format", "a text of numbers without the signature of one"):
+        read(path, format="instrument")
+
+
 def test_a_heading_of_known_entries_is_read(tmp_path):
     heading = ["Pixel: 0.5 um", "Z unit: nm", "Nx: 24", "Size: 24 x 24 px", "# ----"]
     assert_heights(read(written(tmp_path, text(rows(), " ", heading)), size=None, height_unit=None))

@@ -32,7 +32,7 @@ _COPIES = 3
 _WITHOUT_SIGNATURE = ("hgt", "nms")
 # Formats that do not identify an instrument. SurfaceTopography reads any text with numbers as `asc` or `xyz`, and then
 # drops fields that are not numbers.
-_OF_ANY_TEXT = ("asc", "xyz", "matrix", *_WITHOUT_SIGNATURE)
+_OF_ANY_TEXT = ("asc", "xyz", "matrix")
 _UNKNOWN = (
     "cannot be read as instrument: the file is damaged, or its format is not known here; expected another `format`, or "
     "an export of the heights as text"
@@ -322,7 +322,7 @@ def _plain_sur(path: Path) -> io.BytesIO | None:
 def is_instrument_text(file) -> bool:
     """Return whether SurfaceTopography recognises the instrument that wrote a text file."""
     try:
-        return file.instrument is not None and file.instrument.format() not in _OF_ANY_TEXT
+        return file.instrument is not None and file.instrument.format() not in _OF_ANY_TEXT + _WITHOUT_SIGNATURE
     except Exception:  # the file has a known format but is damaged; the reader refuses it later
         return True
 
@@ -336,6 +336,12 @@ def read_instrument(file, settings: Preparation) -> FileContent:
         opened.format() in _WITHOUT_SIGNATURE and file.path.suffix.lower()[1:] not in opened.file_extensions()
     ):
         raise UnfitTopography(_UNKNOWN)
+    if opened.format() in _OF_ANY_TEXT:
+        raise UnfitTopography(
+            "is instrument, but the file is a text of numbers without the signature of one; expected matrix or xyz, "
+            "with `size` and `height_unit`",
+            "format",
+        )
     channel, data = _choose_channel(opened, settings)
     sized = channel.physical_sizes is not None
     topography = channel.topography(**({} if sized else {"physical_sizes": (1.0, 1.0)}))

@@ -77,7 +77,7 @@ def load_scan(path: Path, settings: Preparation) -> Scan:
     name, found = _read(path, settings)
     unit = settings.height_unit or found.unit
     if unit is None:
-        raise _missing("height_unit", "the unit of the heights; expected a unit such as 'um'")
+        raise _missing("height_unit", "the unit of the heights in a known form; expected a unit such as 'um'")
     rows, columns = found.heights.shape
     size = settings.size or found.size
     if settings.size is not None:
@@ -94,7 +94,8 @@ def load_scan(path: Path, settings: Preparation) -> Scan:
     if size is None and found.coordinates is not None:
         if settings.lateral_unit is None:
             raise _missing(
-                "lateral_unit", "the unit of its coordinates; expected a unit such as 'um', or the `size` of the scan"
+                "lateral_unit",
+                "the unit of its coordinates in a known form; expected a unit such as 'um', or the `size` of the scan",
             )
         size = tuple(each * settings.lateral_unit for each in found.coordinates)
     elif found.coordinates is not None and not np.isclose(
@@ -106,7 +107,7 @@ def load_scan(path: Path, settings: Preparation) -> Scan:
             "size",
         )
     if size is None:
-        raise _missing("size", "the size of the scan; expected a length such as '90 um'")
+        raise _missing("size", "the size of the scan in a known form; expected a length such as '90 um'")
     replaced = []
     if settings.size and found.size and not np.allclose(size, found.size, rtol=1e-3, atol=0):
         replaced.append(f"the size {' x '.join(map(formatting.length, found.size))}")

@@ -36,12 +36,6 @@ _QUANTITIES = re.compile(r"load|force|radius|area|pressure|displacement|indentat
 _FEW_DIGITS = 1e-6
 # A size in a heading of no known format counts only if the pixels are square up to this relative difference.
 _SQUARE = 1e-2
-# Words in the headings of texts that SurfaceTopography reads: Wyko, SPIP, Attocube, Nova, interferometers, line scans.
-_INSTRUMENT = re.compile(
-    r"Wyko ASCII|File Format\s*=\s*ASCII|x-unit|^\s*Scale X\s*=|height\s+conversion\s+factor"
-    r"|\AX;Y;valid|\AScan Parameters",
-    re.IGNORECASE | re.MULTILINE,
-)
 _NUMBER = r"([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)"
 # One length or two, such as 12 µm x 12 µm.
 _LENGTHS = re.compile(rf"{_NUMBER}\s*(\S+?)?(?:\s*[x×*]\s*{_NUMBER}\s*(\S+)?)?$")
@@ -99,9 +93,7 @@ def format_of_text(file: SourceFile) -> str:
             "to the section `measurements`"
         )
     # Headings from instruments contain lines that are not remarks.
-    if _INSTRUMENT.search("\n".join(layout.heading)) or (
-        any(map(strip_remark, layout.heading)) and is_instrument_text(file)
-    ):
+    if any(map(strip_remark, layout.heading)) and is_instrument_text(file):
         return "instrument"
     return "xyz" if 3 <= layout.columns < _FEWEST_COLUMNS and not _Heading(layout).is_image else "matrix"
 
