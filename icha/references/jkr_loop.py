@@ -35,6 +35,8 @@ _STATES, _SMALLEST = 400, 1e-3
 _GUESSES = (0.5, 1.0, 2.0), (1.0, 3.0), (0.03, 0.3, 1.0)
 # Number of guesses that are refined; relative decrease and step at which a fit ends, far below the noise of tests.
 _REFINED, _CONVERGENCE = 3, {"ftol": 1e-6, "xtol": 1e-6}
+# Unknowns of a fit that are roots of works of adhesion.
+_ROOTS = np.array([False, True, True, False, False])
 # Root of a receding work that no contact reaches, in units of the points. Noise alone lets a fit find receding points:
 # they count only if they lower the squared distances by this number of variances, the limit for a change at an unknown
 # point with a probability of one per cent (D. W. K. Andrews, Econometrica 61 (1993) 821, doi:10.2307/2951764).
@@ -155,6 +157,8 @@ def fit_loop(
         return (data - project(loop_of(unknown))[0]).ravel()
 
     def derivatives(unknown):
+        # Residuals depend on the magnitudes of the roots, so a difference across zero would be no derivative.
+        unknown = np.where(_ROOTS & (np.abs(unknown) < _STEP), np.copysign(_STEP, unknown), unknown)
         return np.stack([residuals(unknown + s) - residuals(unknown - s) for s in _STEP * np.eye(5)], -1) / (2 * _STEP)
 
     guesses, pull_off = [], max(-force.min() / force[top], 0.02)
@@ -197,8 +201,7 @@ def fit_loop(
             f"{_WIDEST:.0f}; expected points that follow the law of JKR. Check signs, units and outliers, or measure "
             "contact radius and indentation"
         )
-    roots = np.array([False, True, True, False, False])
-    unknown, least = np.where(roots, np.abs(fit.x), fit.x), np.where(roots, 0.0, -np.inf)
+    unknown, least = np.where(_ROOTS, np.abs(fit.x), fit.x), np.where(_ROOTS, 0.0, -np.inf)
     loops = [loop_of(np.maximum(unknown + sign * width, least)) for sign in (0, -1, 1)]
     near, branch = project(loops[0])
     return loops, (near * scales).T, branch

@@ -265,12 +265,14 @@ def _warnings(test, errors, interaction_range, thickness, roughness) -> Iterator
     modulus, advancing = test.contact_modulus.value, test.advancing_work.value
     unloading, largest = np.isin(test.used_for, ["stuck", "receding"]), test.loop.stuck_radius
     work = max(advancing, test.receding_work.value if test.receding_work else 0.0)
-    seen = any(each and each.low for each in (test.advancing_work, test.receding_work))
+    works = {"advancing": test.advancing_work, "receding": test.receding_work}
+    seen = {name: each.value for name, each in works.items() if each and each.low}
     fitted = {"radius": test.radius, "contact_modulus": modulus} | ({"surface_energy": work} if seen else {})
     yield from unusual_arguments(fitted)
-    if not seen:
-        yield "the points show no adhesion: intervals of the work of adhesion begin at 0"
-    elif work < _LEAST_WORK:
+    for name, branch in (("advancing", "loading"), ("receding", "unloading")):
+        if works[name] and name not in seen:
+            yield f"points of {branch} show no adhesion: the interval of the {name} work of adhesion begins at 0"
+    if seen and work < _LEAST_WORK:
         yield (
             f"the work of adhesion, {1e3 * work:.2g} mJ/m², is less than {1e3 * _LEAST_WORK:g} mJ/m²; expected 10 to "
             "200 mJ/m² between smooth surfaces. Check the units of the radius and of the columns"
@@ -322,12 +324,12 @@ def _warnings(test, errors, interaction_range, thickness, roughness) -> Iterator
             f"force at an indentation is about {100 * error:.0f} % larger than on a half-space; use thicker samples or "
             "smaller loads"
         )
+    for name, energy in seen.items():
+        tabor = Material(modulus, energy, interaction_range).tabor_parameter(test.radius)
+        if short := describe_short_range(float(tabor)):
+            yield f"{name} work: {short}"
     if seen:
-        energy = advancing or work
-        if short := describe_short_range(
-            float(Material(modulus, energy, interaction_range).tabor_parameter(test.radius))
-        ):
-            yield short
+        energy = next(iter(seen.values()))
         bending = full_contact_energy_ratio(roughness.full_contact_energy, modulus, energy) if roughness else 0.0
         if bending > 1 / HIGH_PULL_OFF_BELOW:
             yield (
