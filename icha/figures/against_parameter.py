@@ -150,7 +150,7 @@ def _pull_off_of_spheres(study, runs):
     fig, [panels] = new_panels(3.1)
     say(
         fig,
-        f"Pull-off force (a) and energy lost from first contact to separation (b) of smooth spheres, by "
+        "Pull-off force (a) and energy lost from first contact to separation (b) of smooth spheres, by "
         f"{MODELS[labels.model].words}.",
         _TABOR,
         "The theory of Maugis is for a constant attraction; JKR and DMT are its limits.",

@@ -181,7 +181,7 @@ def force_indentation(campaign: xr.DataTree, *, study: str, measurements: Sequen
     _show_runs(fig, campaign, series)
     measured = _select_measured(fig, measurements, *names)
     if measured and not together:
-        say(fig, "They are drawn beside all series of their material, whatever the shape.")
+        say(fig, "Measurements are drawn beside all series of their material, whatever the shape.")
     points = map(panel.points, [*runs, *(each.values for each, _ in measured)])
     limits = [limits_around(np.concatenate(values)) for values in zip(*points, strict=True)]
     largest = max(float(run["contact_radius"].max()) for run in runs)
@@ -282,7 +282,7 @@ def jkr_plot(campaign: xr.DataTree, *, study: str, measurements: Sequence[Measur
             line = 0.75 / modulus * (x + np.sqrt(8 * np.pi * modulus * float(run[name])))
             plot(ax, x * scale, line * 1e3, Name("fit of JKR", labels), color=each.colour, **_FIT)
     measured = _select_measured(fig, measurements, "force", "contact_radius")
-    say(fig, "Of these, all states are shown, also those whose edge stands." if measured else "")
+    say(fig, "All measured states are shown, also those whose edge stands." if measured else "")
     for each, look in measured:
         force = each.values["force"]
         x, y = _straight(force, each.values["contact_radius"], series[0].runs.first)

@@ -3,8 +3,8 @@
 Loading follows the equilibria of Johnson, Kendall and Roberts with the advancing work of adhesion. From the turning
 point, the contact is stuck: its radius is constant, and the force decreases with the stiffness 2 E* a of a flat punch,
 until the energy release rate is the receding work of adhesion. Then unloading follows the equilibria with this work (D.
-Maugis and M. Barquins, J. Phys. D: Appl. Phys. 11 (1978) 1989, doi:10.1088/0022-3727/11/14/011).
-Where the sphere would not touch the undeformed plane it may also be free, without a force: before and after contact.
+Maugis and M. Barquins, J. Phys. D: Appl. Phys. 11 (1978) 1989, doi:10.1088/0022-3727/11/14/011). Where the sphere
+would not touch the undeformed plane it may also be free, without a force: before and after contact.
 
 All measured quantities have errors, so a fit minimises the squared distances between points and curves, each quantity
 divided by its error (P. T. Boggs, R. H. Byrd and R. B. Schnabel, SIAM J. Sci. Stat. Comput. 8 (1987) 1052,

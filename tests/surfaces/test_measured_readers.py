@@ -222,6 +222,7 @@ WITHOUT_A_MAP = [
     *((f"scan.{ending}", "", "is empty") for ending in ("txt", "xyz", "npy", "nc", "h5", "dat")),
     ("heading.xyz", "# width 90 um\n\n  # heights\n", "has no numbers"),
 ]
+PROFILE = "X;Y;valid\n[mm];[mm];[1/0]\n" + "\n".join(f"{k * 0.1};{k % 7};1" for k in range(50))
 
 
 @pytest.mark.parametrize(("name", "content", "words"), WITHOUT_A_MAP, ids=[name for name, *_ in WITHOUT_A_MAP])
@@ -229,6 +230,12 @@ def test_a_file_without_a_map_of_heights_is_refused(tmp_path, name, content, wor
     (tmp_path / name).write_text(content)
     with refused("path", words):
         scan(tmp_path / name, height_unit=NM, size=SIZE)
+
+
+def test_the_columns_of_a_profile_are_asked_for(tmp_path):
+    (tmp_path / "profile.csv").write_text(PROFILE)
+    with refused("columns", r"the columns are \[mm\], \[mm\], \[1/0\]; expected the columns x, y and z"):
+        scan(tmp_path / "profile.csv", height_unit=NM, size=SIZE)
 
 
 def test_what_is_missing_is_named(tmp_path):

@@ -358,9 +358,9 @@ class _Heading:
             problem = (
                 f"is missing, and the lengths in the heading, {stated}, do not fit {columns} x {rows} square pixels"
             )
-        if settings.size is None and problem:
-            raise UnfitTopography(f"{problem}. Give the size in this key", "size")
         if settings.size is None:
+            if problem:
+                raise UnfitTopography(f"{problem}. Give the size in this key", "size")
             self.ask_beside_unknown_lines("size", stated)
         return (None if problem else found[0][1:]), None
 
