@@ -295,9 +295,9 @@ def _warnings(test, errors, interaction_range, thickness, roughness) -> Iterator
             "that the points are in the order of the test, not in the reverse order"
         )
     force, pull_off = float(test.measured["force"].max()), 1.5 * math.pi * test.radius * work
-    if force > _MOST_FORCE * pull_off:
+    if seen and force > _MOST_FORCE * pull_off:
         yield (
-            f"the largest force is {force / pull_off if pull_off else math.inf:.3g} times the pull-off force: noise "
+            f"the largest force is {force / pull_off:.3g} times the pull-off force: noise "
             "hides the adhesion; smaller loads give narrower intervals"
         )
     free = test.measured["force"][test.used_for == FREE]
@@ -333,8 +333,8 @@ def _warnings(test, errors, interaction_range, thickness, roughness) -> Iterator
         bending = full_contact_energy_ratio(roughness.full_contact_energy, modulus, energy) if roughness else 0.0
         if bending > 1 / HIGH_PULL_OFF_BELOW:
             yield (
-                f"U_full/Δγ = {bending:.2g}: bending the surface into the roughness takes {100 * bending:.0f} % of the "
-                "fitted work of adhesion, which is an apparent one, below that of smooth surfaces"
+                f"U_full/Δγ = {bending:.2g}: full contact with the roughness stores this energy per fitted work of "
+                "adhesion, so this work is an apparent one, below that of smooth surfaces"
             )
     residual = np.stack([test.residuals[name] / error for name, error in errors.items()])
     residual = residual[:, (np.abs(residual) > _ROUNDING).any(axis=0)]

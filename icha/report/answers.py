@@ -36,6 +36,7 @@ class Answer(NamedTuple):
     note : text about runs that are left out, about seeds with full contact, and about an error of the grid that the
         interval does not contain; empty if there are none.
     limit : sentence that names what limits the accuracy.
+    mean : "geometric" or "arithmetic", the kind of mean over the seeds.
     """
 
     contact: str
@@ -48,6 +49,7 @@ class Answer(NamedTuple):
     shares: dict[str, float]
     note: str
     limit: str
+    mean: str
 
     @property
     def half_width(self) -> float:
@@ -121,6 +123,7 @@ def _answer(row: xr.Dataset) -> Answer:
         {name: share * abs(value) * factor for name, share in causes.items()},
         "".join(f"; {note}" for note in notes if note),
         _limit(row, shares),
+        "geometric" if row["geometric"] else "arithmetic",
     )
 
 
@@ -168,8 +171,8 @@ def sentences(answers: list[Answer]) -> list[str]:
 
 def answers_table(answers: list[Answer]) -> Table:
     """Return the table of the answers of a study."""
-    rows = [(each.contact, each.state, each.quantity, each.number) for each in answers]
-    return Table("All estimates (causes of the half-width)", ("contact", "state", "quantity", "estimate"), rows)
+    rows = [(each.contact, each.state, each.quantity, each.mean, each.number) for each in answers]
+    return Table("All estimates (causes of the half-width)", ("contact", "state", "quantity", "mean", "estimate"), rows)
 
 
 def samples_table(data: xr.Dataset) -> Table:
