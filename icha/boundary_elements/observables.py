@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from icha.boundary_elements.patches import CellState, free_edges, label_patches, labels_at, patch_centres
+from icha.boundary_elements.patches import CellState, edge_lengths, label_patches, labels_at, patch_centres
 from icha.contact.model import PRESSURE_BINS, gap_bins
 from icha.surfaces.resolution import NYQUIST_CELLS, resolution_of
 from icha.surfaces.surface import Surface
@@ -130,7 +130,9 @@ class PatchObservables:
         def sums(weight):
             return np.bincount(labels, weight, count + 1)[1:]
 
-        area = sums(areas) * h**2
+        area, share = sums(areas) * h**2, sums(areas) / grid**2
+        # On a periodic square, no edge of an area is shorter than that of a circle, a circular hole, or a stripe.
+        shortest = grid * np.minimum(2 * np.sqrt(np.pi * np.minimum(share, 1 - share)), 2)
         of_summit = labels_at(contact.summit_cells, state.cells, labels)
         order = np.argsort(contact.asperities.height, kind="stable")
         # A patch without a summit gets the radius of the rms curvature of the surface.
@@ -142,8 +144,7 @@ class PatchObservables:
             "spot_y": centre[:, 1],
             "spot_radius": np.sqrt(area / np.pi),
             "spot_area": area,
-            # For edges in all directions, the mean length of the free edges is 4/pi times the perimeter.
-            "spot_perimeter": np.pi / 4 * sums(free_edges(state.cells, grid)) * h,
+            "spot_perimeter": np.maximum(edge_lengths(state.cells, areas, grid, labels, count), shortest) * h,
             "spot_force": sums(state.pressure) * h**2,
             "spot_curvature_radius": radius[1:],
             "spot_members": np.bincount(of_summit, minlength=count + 1)[1:],

@@ -110,6 +110,32 @@ def free_edges(cells: np.ndarray, grid: int) -> np.ndarray:
     return 4.0 - np.count_nonzero(touching[adjacent(cells, grid)], axis=0)
 
 
+# Steps to the next cells in 16 directions (down, right). The first and the last are those of a half turn from 0.
+_STEPS = ((0, 1), (1, 2), (1, 1), (2, 1), (1, 0), (2, -1), (1, -1), (1, -2))
+
+
+def edge_lengths(cells: np.ndarray, areas: np.ndarray, grid: int, labels: np.ndarray, count: int) -> np.ndarray:
+    """Return the length of the edge of each patch, (count,), in cell sizes, by Crofton's formula.
+
+    A line crosses an edge as often as the areas of its cells, (k,), divided by the cell area, rise or fall by one. Mean
+    over lines in 16 directions, this is 2/pi of the length per distance of the lines, for straight edges within 2 %.
+    """
+    angles = np.array([np.arctan2(down, right) for down, right in _STEPS])
+    shares = np.diff(0.5 * (angles + np.append(angles[1:], np.pi)), prepend=0.5 * (angles[-1] - np.pi)) / np.pi
+    lengths = np.zeros(count)
+    for (down, right), share in zip(_STEPS, shares, strict=True):
+        for sign in (1, -1):
+            row, column = (cells // grid + sign * down) % grid, (cells % grid + sign * right) % grid
+            present, index = find_among(row * grid + column, cells)
+            change = areas.copy()
+            same = labels[present] == labels[index]
+            at = np.flatnonzero(present)[same]
+            # The cells of a patch meet twice.
+            change[at] = 0.5 * np.abs(areas[at] - areas[index[same]])
+            lengths += share / np.hypot(down, right) * np.bincount(labels, change, count + 1)[1:]
+    return np.pi / 2 * lengths
+
+
 def patch_centres(cells: np.ndarray, grid: int, labels: np.ndarray, count: int, weight: np.ndarray) -> np.ndarray:
     """Return the centre (x, y) of each patch, (count, 2), in cell sizes: the weighted circular mean of its cells."""
     turn = np.exp(2j * np.pi * np.arange(grid) / grid)
