@@ -52,12 +52,11 @@ class Estimate(NamedTuple):
     high: float
 
     def text(self, unit: str) -> str:
-        """Return value and interval with a prefixed unit, such as `31 mJ/m², 90 % interval 29 to 33 mJ/m²`."""
+        """Return value and interval with a prefixed unit, such as `31.2 mJ/m², 90 % interval 29.0 to 33.4 mJ/m²`."""
         factor, name = choose_unit(max(map(abs, self)), unit)
-        # The ends of a narrow interval need more than three digits to differ.
-        low, high = factor * self.low, factor * self.high
-        digits = next((n for n in range(3, 6) if f"{low:.{n}g}" != f"{high:.{n}g}"), 6)
-        value, low, high = (f"{each * factor:.{digits}g}" for each in self)
+        width = factor * (self.high - self.low)
+        places = min(max(0, 1 - math.floor(math.log10(width))), 9) if width > 0 else 3
+        value, low, high = (f"{each * factor:.{places}f}" for each in self)
         return f"{value} {name}, {100 * PROBABILITY:.0f} % interval {low} to {high} {name}"
 
 
