@@ -65,6 +65,8 @@ _NAMES = {
     "|invalid value|invalid data|invalid height|void value|null value|fill value|fillvalue",
 }
 _KNOWN = {*_NAMES, "dx", "dy", "distance of points"}
+# Names with a meaning only in pairs. A width alone may contradict a size in the same heading.
+_SIDES = {"width", "height", "dx", "dy"}
 # A word, a number with or without a unit, or two of them, such as 24 x 24 px.
 _PLAIN = re.compile(rf"(?:{_NUMBER}\s*)?\S*(?:\s*[x×*]\s*{_NUMBER}\s*\S*)?")
 _MEANINGS = {name: meaning for meaning, names in _NAMES.items() for name in names.split("|")}
@@ -248,7 +250,7 @@ class _Heading:
         """Find the entries of a heading: meaning of the name, value, and line."""
         self.lines, self.decimal = layout.heading, layout.decimal
         self.entries: list[tuple[str, str, str]] = []
-        names, previous, unknown = set(), ("", ""), []
+        names, previous, unknown = set(), ("", "", ""), []
         of_titles = _find_titles(layout)[1]
         for k, line in enumerate(self.lines, of_titles - len(self.lines)):
             if not (found := _ENTRY.match(line.replace('"', ""))):
@@ -259,18 +261,20 @@ class _Heading:
             value = re.sub(r"(?<=\d)\s*[,;\t]\s*(?=[^\W\d])", " ", found[2])
             meaning = _MEANINGS.get(name, name)
             self.entries.append((meaning, value, line))
-            plain = metres_of(value) if "unit" in meaning else _PLAIN.fullmatch(value)
-            unknown += [] if k >= 0 or (meaning in _KNOWN and plain) else [line]
             # The height of an image follows its width; elsewhere it may be a height of the surface.
-            if (previous[0], meaning) in (("width", "height"), ("dx", "dy")):
+            if pair := (previous[0], meaning) in (("width", "height"), ("dx", "dy")):
                 self.entries.append(("size" if meaning == "height" else "pixel", f"{previous[1]} x {value}", line))
-            previous = meaning, value
+                unknown = [each for each in unknown if each != previous[2]]
+            plain = metres_of(value) if "unit" in meaning else _PLAIN.fullmatch(value)
+            known = pair or (meaning in _KNOWN and meaning not in _SIDES)
+            unknown += [] if k >= 0 or (known and plain) else [line]
+            previous = meaning, value, line
             names.add(name)
         self.is_grid = {"ncols", "nrows"} <= names
-        # The heading of an image that Gwyddion exported.
-        image = ["width", "height", "value units"]
-        self.is_image = image == [each for each, _, line in self.entries if line.startswith("#") and each in image]
-        is_points = ["lateral units", "value units"] == [each for each, *_ in self.entries if each in _KNOWN]
+        stated, remarks = [each for each, *_ in self.entries if each in _KNOWN], "".join(self.lines).startswith("#")
+        # The headings of an image and of points that Gwyddion exported.
+        self.is_image = remarks and stated == ["width", "height", "size", "value units"]
+        is_points = stated == ["lateral units", "value units"]
         is_keyence = not names.isdisjoint({"xy calibration", "xy justierung"})
         is_zygo = "".join(self.lines[:1]).startswith(_ZYGO)
         # Lines of a heading of no known format that ICHA does not know.
@@ -351,13 +355,12 @@ class _Heading:
         stated = ", ".join(text for text, _, _ in found)
         pixels = [(x / columns, y / rows) for _, x, y in found]
         mark = "." if self.decimal == "," else ","
-        problem = ""
+        problem, known = "", self.is_grid or self.is_image
         if any(AMBIGUOUS_COMMA.match(text.replace(".", ",")) and mark in text for text, _, _ in found):
             problem = f"is {stated!r} in the file; the {mark!r} may be decimal or separate thousands"
-        elif not (self.is_grid or self.is_image or np.allclose(pixels, pixels[0][0], rtol=_SQUARE, atol=0)):
-            problem = (
-                f"is missing, and the lengths in the heading, {stated}, do not fit {columns} x {rows} square pixels"
-            )
+        elif not np.allclose(pixels, pixels[0] if known else pixels[0][0], rtol=_SQUARE, atol=0):
+            pixels_of_table = f"{columns} x {rows} {'' if known else 'square '}pixels"
+            problem = f"is missing, and the lengths in the heading, {stated}, do not fit {pixels_of_table}"
         if settings.size is None:
             if problem:
                 raise UnfitTopography(f"{problem}. Give the size in this key", "size")
