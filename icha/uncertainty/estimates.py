@@ -166,7 +166,8 @@ def _levels_at(values, place):
     """Return the values of a contact by level and seed, the seeds that each level leaves out, and a note.
 
     A level uses only seeds that the cheaper levels also have; a level without any value is not part of the estimate.
-    The asperity model is not used if it has no value for a seed of boundary elements that has one.
+    The asperity model is not used if it has no value for a seed of boundary elements that has one, or if it has only
+    the seeds of the next level: then it tells nothing about other seeds.
     """
     at = (slice(None), *place)
     present = {level: of for level, of in values.items() if of is not None}
@@ -186,6 +187,8 @@ def _levels_at(values, place):
         if by_seed[level] or level == "fine":
             lacking = why
             left_out.append(find_left_out(f"seeds of {LEVELS[level]}", list(why.values())))
+    if by_seed["asperities"].keys() == (by_seed["coarse"] or by_seed["fine"]).keys():
+        by_seed["asperities"] = {}
     return by_seed, left_out, note
 
 

@@ -9,6 +9,7 @@ import cyclic_campaign as cyclic
 import numpy as np
 import pytest
 import xarray as xr
+from scipy import stats
 from typer.testing import CliRunner
 
 from icha.cli import app
@@ -56,7 +57,7 @@ def test_estimates_have_the_mean_of_all_seeds_and_the_level_of_the_fine_grid(ans
     np.testing.assert_allclose(
         np.log(here["estimate_high"] / here["estimate"]), np.hypot(here["share_seeds"], here["share_grid"])
     )
-    assert here[["asperity_seeds", "coarse_seeds", "fine_seeds"]].to_array().values.T.tolist() == [[3, 3, 2]] * 2
+    assert here[["asperity_seeds", "coarse_seeds", "fine_seeds"]].to_array().values.T.tolist() == [[0, 3, 2]] * 2
     assert "nominal_pressure" not in study["quantity"].values  # the targets prescribe it
 
 
@@ -137,8 +138,19 @@ def test_answers_of_a_lens_are_forces_radii_and_works_of_adhesion():
     assert all(each.unit.endswith("N") for each in rows if each.quantity == "pull-off force")
 
 
-@pytest.mark.parametrize(("lost", "asperities"), [(1, 0), (3, 2)])
-def test_an_asperity_model_that_is_not_applicable_does_not_discard_boundary_elements(lost, asperities):
+def test_the_asperity_model_for_the_same_seeds_has_no_effect():
+    study = estimate_campaign(campaign_tree([*compared.runs().items(), *compared.patches()]))["one"].to_dataset()
+    row = study.isel(answer=(study["quantity"] == "mean_gap").values).isel(answer=0)
+    runs = [run for labels, run in compared.patches() if labels.material == row["material"]]
+    gaps = np.log([float(run["mean_gap"][0]) for run in runs])
+    mean, half = np.mean(gaps), stats.t.ppf(0.95, 2) * stats.sem(gaps)
+    assert row["geometric"] and row["asperity_seeds"] == 0
+    assert float(row["estimate"]) == pytest.approx(math.exp(mean))
+    assert float(row["estimate_high"]) == pytest.approx(math.exp(mean + half))
+
+
+@pytest.mark.parametrize("lost", [1, 3])
+def test_an_asperity_model_that_is_not_applicable_does_not_discard_boundary_elements(lost):
     """If the lost seed has boundary elements, they count, and the estimate does without the asperity model."""
 
     def broken(labels, run):
@@ -149,13 +161,13 @@ def test_an_asperity_model_that_is_not_applicable_does_not_discard_boundary_elem
     runs = [(labels, broken(labels, run)) for labels, run in [*compared.runs().items(), *fine]]
     study = estimate_campaign(campaign_tree(runs))["one"].to_dataset()
     found = {name: study[f"{name}_seeds"].values[study["material"].values == "soft"] for name in ("asperity", "fine")}
-    assert set(found["asperity"]) == {asperities} and set(found["fine"]) == {2}
+    # Without the third seed, the model has only the seeds of boundary elements.
+    assert set(found["asperity"]) == {0} and set(found["fine"]) == {2}
     assert set(study["asperity_seeds"].values[study["material"].values == "hertz"]) == {3}
     said = study["left_out"].values[study["material"].values == "soft"][0]
-    assert ("it has no value for 1 seed of boundary elements (outside the range of the model)" in said) == (
-        asperities == 0
-    )
-    assert ("2 of 3 seeds of the asperity model" in said) == (asperities == 2)
+    words = "it has no value for 1 seed of boundary elements (outside the range of the model)"
+    assert (words in said) == (lost == 1)
+    assert ("2 of 3 seeds of the asperity model" in said) == (lost == 3)
 
 
 def test_a_study_without_several_seeds_of_boundary_elements_has_no_answers():
