@@ -118,7 +118,7 @@ ESTIMATED_OF_LOOPS: tuple[str, ...] = ("pull_off_pressure", "hysteresis_loss")
 PER_NOMINAL_AREA = (*ESTIMATED_AT_TARGETS.keys() - {"spot_count"}, *ESTIMATED_OF_LOOPS)
 _OF_ADHESIVE_SQUARES = ("loss_over_contact", "work_of_adhesion_approach", "work_of_adhesion_retraction")
 OF_SQUARES = ("contact_radius", "stiffness", "force", "pull_off_force", *_OF_ADHESIVE_SQUARES)
-OF_ADHESION = ("pull_off_pressure", "pull_off_force", *_OF_ADHESIVE_SQUARES)
+OF_ADHESION = ("pull_off_pressure", "pull_off_force", "hysteresis_loss", *_OF_ADHESIVE_SQUARES)
 ESTIMATED_AT_TARGETS |= {"contact_radius": AREAS, "stiffness": (), "force": LOADS}
 ESTIMATED_OF_LOOPS += tuple(name for name in OF_SQUARES if name not in ESTIMATED_AT_TARGETS)
 # Estimated quantities that may be negative: the load of a contact with adhesion may be a tension.
