@@ -297,7 +297,7 @@ def _warnings(test, errors, interaction_range, thickness, roughness) -> Iterator
     if seen and force > _MOST_FORCE * pull_off:
         yield (
             f"the largest force is {force / pull_off:.3g} times the pull-off force: noise "
-            "hides the adhesion; smaller loads give narrower intervals"
+            "hides the adhesion, and may look like adhesion; smaller loads give narrower intervals"
         )
     free = test.measured["force"][test.used_for == FREE]
     if len(free) >= LEAST_POINTS:
