@@ -130,6 +130,7 @@ def test_blocks_of_rows_are_refused_but_not_empty_lines_between_all_rows(tmp_pat
             for line in ("Unit Z: nm", "Height [nm]", "The heights are in nm.")
         ),
         (["Z unit: nm", "Height unit: um"], "the file states nm and um"),
+        (["Z unit: nm", "Units: um"], "the file states nm and um"),
         # Gwyddion writes the same Korean words for the unit of coordinates and that of heights.
         (["# 채널: Z", "# 값 단위: nm", "# 값 단위: um"], "the file states nm and um"),
     ],
@@ -226,6 +227,7 @@ def test_counts_of_a_heading_are_checked(tmp_path, line):
         (["Width: 12 um", "Lines: 24"], "does not contain the size"),
         (["Width: 12 um", "Height: 350 nm"], "12 um x 350 nm, do not fit 24 x 24 square pixels"),
         (["Scan size: 12 um x 6 um"], "do not fit"),
+        (["Scan size: 12 um x 11.98 um"], "do not fit"),
         (["Scan size: 10 um", "Pixel: 0.5 um"], "10 um, 0.5 um, do not fit"),
         (["Pixel: 0.5"], "does not contain the size"),
         (["# Width: 24 um", "# Height: 12 um", "# Pixel: 0.5 um", "# Value units: nm"], "do not fit 24 x 24 square"),

@@ -34,8 +34,9 @@ _NAMES_OF_Z = re.compile(rf"z|h|height|{DEPTHS}", re.IGNORECASE)
 _QUANTITIES = re.compile(r"load|force|radius|area|pressure|displacement|indentation|approach|time", re.IGNORECASE)
 # Relative error of numbers with seven digits, or of single precision.
 _FEW_DIGITS = 1e-6
-# A size in a heading of no known format counts only if the pixels are square up to this relative difference.
-_SQUARE = 1e-2
+# A size in a heading of no known format counts only if the pixels are square up to this relative difference. Sizes from
+# the first to the last point give pixels that are not.
+_SQUARE = 1e-3
 _NUMBER = r"([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)"
 # One length or two, such as 12 µm x 12 µm.
 _LENGTHS = re.compile(rf"{_NUMBER}\s*(\S+?)?(?:\s*[x×*]\s*{_NUMBER}\s*(\S+)?)?$")
@@ -325,7 +326,7 @@ class _Heading:
 
     def find_height_unit(self, settings: Preparation) -> float | None:
         """Return the unit of the heights, m; None without a unit."""
-        texts = self.values("value units", "unit of heights") or self.values("unit")
+        texts = self.values("value units", "unit of heights", "unit")
         unit = _agreed("height_unit", texts, settings.height_unit)
         if texts and settings.height_unit is None:
             self.ask_beside_unknown_lines("height_unit", texts[0])
