@@ -162,7 +162,7 @@ UNKNOWN = (
     "|log10 of heights|Comment: heights multiplied by 10|Height channel: x10|Conversion: 0.1|Values x 10|BAD = 0"
     "|Zoom: 50%|half resolution|Multiplied by ten|Normalized to rms = 1|Title: scaled by 10|Filtered, mean 2x2"
     "|Average: 2x2|Units: x10|Objective: 50x|Pixels 4um|Lines: 24, every second one left out|Unit: nm, one half"
-    "|Topography|Width: 96 um|Breite: 24 um|Height: 80 um|dx: 1 um"
+    "|Topography"
 )
 
 
@@ -230,6 +230,7 @@ def test_counts_of_a_heading_are_checked(tmp_path, line):
         (["Scan size: 12 um x 11.98 um"], "do not fit"),
         (["Scan size: 10 um", "Pixel: 0.5 um"], "10 um, 0.5 um, do not fit"),
         (["Pixel: 0.5"], "does not contain the size"),
+        *((["Pixel: 0.5 um", line], f"also '{line}'") for line in ("Width: 96 um", "Breite: 9 um", "Height: 80 um")),
         (["# Width: 24 um", "# Height: 12 um", "# Pixel: 0.5 um", "# Value units: nm"], "do not fit 24 x 24 square"),
         (["ncols 24", "nrows 24", "dx 1 um", "dy 0.5 um", "pixel 0.5 um"], "do not fit 24 x 24 pixels"),
         (["# Channel: Z", "# Width: 1,250 um", "# Height: 1,250 um"], "1,250 um.*thousands"),

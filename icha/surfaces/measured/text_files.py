@@ -66,7 +66,7 @@ _NAMES = {
     "|invalid value|invalid data|invalid height|void value|null value|fill value|fillvalue",
 }
 _KNOWN = {*_NAMES, "dx", "dy", "distance of points"}
-# Names with a meaning only in pairs. A width alone may contradict a size in the same heading.
+# Names with a meaning only in pairs.
 _SIDES = {"width", "height", "dx", "dy"}
 # A word, a number with or without a unit, or two of them, such as 24 x 24 px.
 _PLAIN = re.compile(rf"(?:{_NUMBER}\s*)?\S*(?:\s*[x×*]\s*{_NUMBER}\s*\S*)?")
@@ -177,9 +177,9 @@ def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
     named = "columns x {}, y {}, z {} by their names".format(*columns)
     remarks = named if titled and columns != sorted(columns) else "", heading.unused_factors(settings)
     if x_unit and y_unit and settings.lateral_unit is None:
-        heading.ask_beside_unknown_lines("lateral_unit", "the units of x and y")
+        heading.ask_if_in_doubt("lateral_unit", "the units of x and y")
     if z_unit and settings.height_unit is None:
-        heading.ask_beside_unknown_lines("height_unit", "the unit of z")
+        heading.ask_if_in_doubt("height_unit", "the unit of z")
     size = (nx * dx * x_unit, ny * dy * y_unit) if x_unit and y_unit and settings.lateral_unit is None else None
     return FileContent(
         heights.reshape(ny, nx),
@@ -251,7 +251,10 @@ class _Heading:
         """Find the entries of a heading: meaning of the name, value, and line."""
         self.lines, self.decimal = layout.heading, layout.decimal
         self.entries: list[tuple[str, str, str]] = []
-        names, previous, unknown = set(), ("", "", ""), []
+        self.doubts: dict[str, list[str]] = {}
+        names, previous = set(), ("", "")
+        unknown: list[str] = []
+        alone: list[str] = []
         of_titles = _find_titles(layout)[1]
         for k, line in enumerate(self.lines, of_titles - len(self.lines)):
             if not (found := _ENTRY.match(line.replace('"', ""))):
@@ -263,13 +266,14 @@ class _Heading:
             meaning = _MEANINGS.get(name, name)
             self.entries.append((meaning, value, line))
             # The height of an image follows its width; elsewhere it may be a height of the surface.
-            if pair := (previous[0], meaning) in (("width", "height"), ("dx", "dy")):
+            if (previous[0], meaning) in (("width", "height"), ("dx", "dy")):
                 self.entries.append(("size" if meaning == "height" else "pixel", f"{previous[1]} x {value}", line))
-                unknown = [each for each in unknown if each != previous[2]]
+                alone.pop()
+            elif meaning in _SIDES:
+                alone.append(line)
             plain = metres_of(value) if "unit" in meaning else _PLAIN.fullmatch(value)
-            known = pair or (meaning in _KNOWN and meaning not in _SIDES)
-            unknown += [] if k >= 0 or (known and plain) else [line]
-            previous = meaning, value, line
+            unknown += [] if k >= 0 or (meaning in _KNOWN and plain) else [line]
+            previous = meaning, value
             names.add(name)
         self.is_grid = {"ncols", "nrows"} <= names
         stated, remarks = [each for each, *_ in self.entries if each in _KNOWN], "".join(self.lines).startswith("#")
@@ -278,22 +282,23 @@ class _Heading:
         is_points = stated == ["lateral units", "value units"]
         is_keyence = not names.isdisjoint({"xy calibration", "xy justierung"})
         is_zygo = "".join(self.lines[:1]).startswith(_ZYGO)
-        # Lines of a heading of no known format that ICHA does not know.
-        self.unknown = [] if self.is_image or is_points or is_keyence or is_zygo else unknown
+        # Lines of a heading of no known format that may change what the heading states, by key.
+        if not (self.is_image or is_points or is_keyence or is_zygo):
+            self.doubts = {"height_unit": unknown, "lateral_unit": unknown, "size": unknown + alone}
 
     def values(self, *meanings: str) -> list[str]:
         """Return the values of the entries with these meanings."""
         return [value for meaning, value, _ in self.entries if meaning in meanings]
 
-    def ask_beside_unknown_lines(self, key: str, stated: str) -> None:
-        """Raise UnfitTopography if a heading of no known format has a line that ICHA does not know.
+    def ask_if_in_doubt(self, key: str, stated: str) -> None:
+        """Raise UnfitTopography if a heading of no known format has a line that may change what it states for a key.
 
-        Such a line may change what the heading states for a key, as a line spacing, binning or factor of heights does.
+        Such lines are those that ICHA does not know, and a width alone, which may contradict a size.
         """
-        if self.unknown:
+        if lines := self.doubts.get(key):
             raise UnfitTopography(
-                f"is missing; the heading states {stated!r}, but also {self.unknown[0].strip()[:60]!r}, which may "
-                "change it. Give the value for the table of numbers in this key",
+                f"is missing; the heading states {stated!r}, but also {lines[0].strip()[:60]!r}, which may change it. "
+                "Give the value for the table of numbers in this key",
                 key,
             )
 
@@ -329,7 +334,7 @@ class _Heading:
         texts = self.values("value units", "unit of heights", "unit")
         unit = _agreed("height_unit", texts, settings.height_unit)
         if texts and settings.height_unit is None:
-            self.ask_beside_unknown_lines("height_unit", texts[0])
+            self.ask_if_in_doubt("height_unit", texts[0])
         return unit
 
     def find_lateral_unit(self, settings: Preparation) -> float | None:
@@ -365,7 +370,7 @@ class _Heading:
         if settings.size is None:
             if problem:
                 raise UnfitTopography(f"{problem}. Give the size in this key", "size")
-            self.ask_beside_unknown_lines("size", stated)
+            self.ask_if_in_doubt("size", stated)
         return (None if problem else found[0][1:]), None
 
 
