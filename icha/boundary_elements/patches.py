@@ -110,15 +110,16 @@ def free_edges(cells: np.ndarray, grid: int) -> np.ndarray:
     return 4.0 - np.count_nonzero(touching[adjacent(cells, grid)], axis=0)
 
 
-# Steps to the next cells in 16 directions (down, right). The first and the last are those of a half turn from 0.
+# Steps (down, right) to other cells in half of the 16 directions; the other half has the opposite signs.
 _STEPS = ((0, 1), (1, 2), (1, 1), (2, 1), (1, 0), (2, -1), (1, -1), (1, -2))
 
 
 def edge_lengths(cells: np.ndarray, areas: np.ndarray, grid: int, labels: np.ndarray, count: int) -> np.ndarray:
     """Return the length of the edge of each patch, (count,), in cell sizes, by Crofton's formula.
 
-    A line crosses an edge as often as the areas of its cells, (k,), divided by the cell area, rise or fall by one. Mean
-    over lines in 16 directions, this is 2/pi of the length per distance of the lines, for straight edges within 2 %.
+    Along a line, the contact areas of its cells, (k,), divided by the cell area, change by one at each edge. The number
+    of these changes times the distance of parallel lines has the mean 2/pi of the length over all directions. Here 16
+    directions stand for all, so lengths of straight edges are right within 2 %.
     """
     angles = np.array([np.arctan2(down, right) for down, right in _STEPS])
     shares = np.diff(0.5 * (angles + np.append(angles[1:], np.pi)), prepend=0.5 * (angles[-1] - np.pi)) / np.pi

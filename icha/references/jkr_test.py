@@ -332,8 +332,8 @@ def _warnings(test, errors, interaction_range, thickness, roughness) -> Iterator
         bending = full_contact_energy_ratio(roughness.full_contact_energy, modulus, energy) if roughness else 0.0
         if bending > 1 / HIGH_PULL_OFF_BELOW:
             yield (
-                f"U_full/Δγ = {bending:.2g}: full contact with the roughness stores this energy per fitted work of "
-                "adhesion, so this work is an apparent one, below that of smooth surfaces"
+                f"U_full/Δγ = {bending:.2g}: full contact with the roughness needs {bending:.2g} times the fitted work "
+                "of adhesion, which is an apparent one, below that of smooth surfaces"
             )
     residual = np.stack([test.residuals[name] / error for name, error in errors.items()])
     residual = residual[:, (np.abs(residual) > _ROUNDING).any(axis=0)]

@@ -386,8 +386,8 @@ def test_points_without_adhesion_are_said_to_show_none():
 
 
 def test_the_width_of_an_interval_is_printed_with_two_digits():
-    narrow = Estimate(0.999999e6, 0.99999e6, 1e6).text("Pa")
-    assert narrow == "0.999999 MPa, 90 % interval 0.999990 to 1.000000 MPa"
+    narrow = Estimate(1e6, 0.99999e6, 1.00001e6).text("Pa")
+    assert narrow == "1.000000 MPa, 90 % interval 0.999990 to 1.000010 MPa"
 
 
 def test_intervals_do_not_depend_on_wrong_ratios_of_errors():
